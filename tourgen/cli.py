@@ -1,0 +1,6 @@
+"""The commands: parse, call, print; no logic."""
+
+
+def main() -> int:
+    """Run tourgen."""
+    return 0
