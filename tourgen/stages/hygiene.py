@@ -1,0 +1,69 @@
+"""Hygiene: what later stages and other programs must not stumble over, by trimesh.
+
+Crumbs (components of negligible area), faces without area, faces given twice and faces on edges
+that more than two faces share are removed; vertices that nothing uses go with them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tourgen.errors import StageError
+from tourgen.geometry import Mesh
+from tourgen.stages.mesh_arrays import compact, face_areas
+
+VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What is a crumb.
+
+    Attributes:
+        crumb_area_m2: Components smaller than this go.
+    """
+
+    crumb_area_m2: float = 0.01
+
+
+def hygiene(mesh: Mesh, settings: Settings) -> Mesh:
+    """Return the clean mesh.
+
+    Raises:
+        StageError: Nothing is left.
+    """
+    import trimesh
+
+    welded = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    keep = welded.nondegenerate_faces() & welded.unique_faces()
+    mesh = _without_overfull_edges(compact(mesh, keep))
+    mesh = compact(mesh, _large_enough(mesh, settings.crumb_area_m2))
+    if not len(mesh.faces):
+        raise StageError(
+            "surface: expected a connected surface, found only crumbs",
+            "check the scan's density, or ask for less detail",
+        )
+    return mesh
+
+
+def _large_enough(mesh: Mesh, least_m2: float) -> np.ndarray:
+    import trimesh
+
+    label = trimesh.graph.connected_component_labels(
+        trimesh.graph.face_adjacency(mesh.faces), node_count=len(mesh.faces)
+    )
+    return np.asarray(np.bincount(label, weights=face_areas(mesh))[label] >= least_m2)
+
+
+def _without_overfull_edges(mesh: Mesh) -> Mesh:
+    """Drop the smallest faces of each edge that more than two faces share."""
+    edge = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
+    face = np.repeat(np.arange(len(mesh.faces)), 3)
+    order = np.lexsort((-face_areas(mesh)[face], edge[:, 0] << 32 | edge[:, 1]))
+    key = (edge[:, 0] << 32 | edge[:, 1])[order]
+    third = np.flatnonzero(key[2:] == key[:-2]) + 2
+    keep = np.ones(len(mesh.faces), bool)
+    keep[face[order[third]]] = False
+    return compact(mesh, keep)

@@ -1,0 +1,61 @@
+"""Levels: the room's finest mesh, and the coarse one that shows it at once.
+
+Both are simplified over the whole room by fast-simplification (quadric error metric, Garland and
+Heckbert 1997). The levels between are made tile by tile in ``tiles``, with locked borders.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tourgen.geometry import Mesh
+from tourgen.stages.mesh_arrays import face_areas
+
+VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How many faces.
+
+    Attributes:
+        detail_m: The finest level's detail; sets its faces by area.
+        face_detail_ratio: Mean edge of a finest face over ``detail_m``. Flat parts get larger
+            faces, edges smaller ones.
+        root_faces: Faces of the coarse mesh.
+        most_faces: Upper bound of the finest level.
+    """
+
+    detail_m: float
+    face_detail_ratio: float = 3.0
+    root_faces: int = 12_000
+    most_faces: int = 2_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Levels:
+    """The two ends of the chain."""
+
+    finest: Mesh
+    root: Mesh
+
+
+def levels(mesh: Mesh, settings: Settings) -> Levels:
+    """Simplify to the finest and the coarsest level."""
+    edge_m = settings.face_detail_ratio * settings.detail_m
+    wanted = int(face_areas(mesh).sum() / (edge_m**2 * np.sqrt(3) / 4))
+    finest = _simplify(mesh, min(max(wanted, settings.root_faces), settings.most_faces))
+    return Levels(finest, _simplify(finest, settings.root_faces))
+
+
+def _simplify(mesh: Mesh, faces: int) -> Mesh:
+    import fast_simplification
+
+    if len(mesh.faces) <= faces:
+        return mesh
+    vertices, triangles = fast_simplification.simplify(
+        mesh.vertices, mesh.faces, target_count=faces, agg=5
+    )
+    return Mesh(mesh.origin, vertices.astype(np.float32), triangles.astype(np.int32))

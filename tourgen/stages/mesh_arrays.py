@@ -1,0 +1,50 @@
+"""What several mesh stages ask of faces, in numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from tourgen.geometry import Int32, Mesh
+
+
+def compact(mesh: Mesh, keep: npt.NDArray[np.generic]) -> Mesh:
+    """The faces that ``keep`` (a mask or positions) selects, without unused vertices."""
+    used, faces = np.unique(mesh.faces[keep], return_inverse=True)
+    return Mesh(mesh.origin, mesh.vertices[used], faces.reshape(-1, 3).astype(np.int32))
+
+
+def face_areas(mesh: Mesh) -> npt.NDArray[np.float32]:
+    """Area of each face, square metres."""
+    return np.asarray(np.linalg.norm(_doubled_normals(mesh), axis=1) / 2, np.float32)
+
+
+def face_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
+    """Unit normal of each face, zero where it has no area."""
+    normal = _doubled_normals(mesh)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.asarray(normal / np.maximum(length, 1e-20), np.float32)
+
+
+def _doubled_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    return np.asarray(np.cross(b - a, c - a), np.float32)
+
+
+def face_adjacency(faces: Int32) -> npt.NDArray[np.int64]:
+    """(m, 2) pairs of faces that share an edge; an edge of more than two faces gives a chain."""
+    edge = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
+    key = edge[:, 0] << 32 | edge[:, 1]
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    return np.stack([order[same], order[same + 1]], axis=1) // 3
+
+
+def weld(meshes: list[Mesh]) -> Mesh:
+    """Join meshes of one origin; vertices at the same place become one."""
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    offset = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
+    faces = np.concatenate([m.faces + o for m, o in zip(meshes, offset, strict=True)])
+    view = np.ascontiguousarray(vertices).view(np.dtype((np.void, 12))).reshape(-1)
+    _, first, inverse = np.unique(view, return_index=True, return_inverse=True)
+    return Mesh(meshes[0].origin, vertices[first], inverse.reshape(-1)[faces].astype(np.int32))

@@ -1,0 +1,80 @@
+"""Sight: what a scanner standing somewhere would see of a cloud.
+
+A spherical depth buffer: for each direction, the nearest point. It answers two questions that
+normals and trimming ask: is this point visible from there, and does a station look through this
+place without hitting anything?
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import minimum_filter
+
+from tourgen.geometry import Float32, Float64
+
+
+@dataclass(frozen=True, slots=True)
+class DepthBuffer:
+    """Nearest range by direction.
+
+    Attributes:
+        station: (3,) metres.
+        cell_deg: Edge of a cell at the horizon.
+        range_m: (elevations, azimuths) float32, infinity where nothing was hit.
+    """
+
+    station: Float64
+    cell_deg: float
+    range_m: Float32
+
+    def cells(self, points: Float32) -> tuple[npt.NDArray[np.int64], Float32, Float32]:
+        """Flat cell index, range and elevation in degrees of each of (n, 3) points."""
+        return _directions(points, self.station, self.cell_deg)
+
+    def sees(self, points: Float32, tolerance: float = 0.03) -> npt.NDArray[np.bool_]:
+        """Mask of the (n, 3) points with nothing in front of them."""
+        cell, distance, _ = self.cells(points)
+        return np.asarray(distance <= self.range_m.reshape(-1)[cell] * (1 + tolerance) + 0.02)
+
+    def looks_through(
+        self, points: Float32, lowest_deg: float, margin_m: float
+    ) -> npt.NDArray[np.bool_]:
+        """Mask of the (n, 3) places where a surface would have been measured and was not.
+
+        Such a place lies within the field of view, and neither in its direction nor in the
+        cells around is anything as near, give or take ``margin_m``.
+        """
+        cell, distance, elevation = self.cells(points)
+        nearest = minimum_filter(self.range_m, size=3, mode=("nearest", "wrap"))
+        free = distance + margin_m < nearest.reshape(-1)[cell]
+        return np.asarray(free & (elevation > lowest_deg))
+
+
+def depth_buffer(points: Float32, station: Float64, cell_deg: float) -> DepthBuffer:
+    """Render (n, 3) points as seen from a station."""
+    cell, distance, _ = _directions(points, station, cell_deg)
+    rows, columns = _shape(cell_deg)
+    nearest = np.full(rows * columns, np.inf, np.float32)
+    np.minimum.at(nearest, cell, distance)
+    return DepthBuffer(station, cell_deg, nearest.reshape(rows, columns))
+
+
+def _shape(cell_deg: float) -> tuple[int, int]:
+    return round(180 / cell_deg), round(360 / cell_deg)
+
+
+def _directions(
+    points: Float32, station: Float64, cell_deg: float
+) -> tuple[npt.NDArray[np.int64], Float32, Float32]:
+    offset = points - station.astype(np.float32)
+    horizontal = np.hypot(offset[:, 0], offset[:, 1])
+    distance = np.hypot(horizontal, offset[:, 2])
+    elevation = np.degrees(np.arctan2(offset[:, 2], horizontal))
+    azimuth = np.degrees(np.arctan2(offset[:, 1], offset[:, 0]))
+    rows, columns = _shape(cell_deg)
+    row = np.minimum(((elevation + 90) / cell_deg).astype(np.int64), rows - 1)
+    column = ((azimuth + 180) / cell_deg).astype(np.int64) % columns
+    return row * columns + column, distance, elevation

@@ -1,0 +1,98 @@
+"""Stations: find where the scanner stood, from the blind discs under its tripod.
+
+No scanner looks straight down. Around each tripod the floor is bare, or holds only what other
+stations saw, and right outside that disc it is denser than anywhere else. So the discs are rings
+in a density map of the floor: the strongest answers of a ring-shaped filter, dense outside and
+sparse inside, over the radii that tripods make.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+from scipy.signal import fftconvolve
+
+from tourgen.geometry import Float32, Float64
+
+VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What a tripod looks like.
+
+    Attributes:
+        blind_angle_deg: Half opening of the cone under the scanner that it does not see.
+        radius_m: Smallest and largest radius of a blind disc.
+        cell_m: Edge of a cell of the floor's density map.
+        contrast: Least step of log density at the disc's edge; e times denser is 1.
+        most: Most stations looked for.
+    """
+
+    blind_angle_deg: float = 30.0
+    radius_m: tuple[float, float] = (0.5, 1.15)
+    cell_m: float = 0.03
+    contrast: float = 0.9
+    most: int = 12
+
+
+def find_stations(points: Float32, settings: Settings) -> Float64:
+    """Where the scanner stood.
+
+    Args:
+        points: (n, 3), metres, z up, unthinned: density is the evidence.
+        settings: See ``Settings``.
+
+    Returns:
+        (s, 3) metres, strongest evidence first; s is 0 where no disc stands out.
+    """
+    floor_z = _floor_z(points)
+    on_floor = points[np.abs(points[:, 2] - floor_z) < 0.03, :2].astype(np.float64)
+    if len(on_floor) < 1000:
+        return np.empty((0, 3))
+    low = on_floor.min(axis=0)
+    cell = np.floor((on_floor - low) / settings.cell_m).astype(int)
+    shape = cell.max(axis=0) + 1
+    count = np.bincount(cell[:, 0] * shape[1] + cell[:, 1], minlength=shape.prod())
+    density = np.log1p(gaussian_filter(count.reshape(shape).astype(float), 1.0))
+    radii = np.arange(*settings.radius_m, settings.cell_m)
+    score = np.stack([_ring_response(density, radius / settings.cell_m) for radius in radii])
+    found = []
+    for _ in range(settings.most):
+        best = np.unravel_index(np.argmax(score), score.shape)
+        if score[best] < settings.contrast:
+            break
+        radius = radii[best[0]]
+        centre = low + (np.array(best[1:]) + 0.5) * settings.cell_m
+        height = radius / np.tan(np.radians(settings.blind_angle_deg))
+        found.append([*centre, floor_z + height])
+        x, y = np.ogrid[: shape[0], : shape[1]]
+        near = np.hypot(x - best[1], y - best[2]) < 0.7 * radius / settings.cell_m
+        score[:, near] = -np.inf
+    return np.array(found).reshape(-1, 3)
+
+
+def _floor_z(points: Float32) -> float:
+    """Height of the lowest level that holds a good share of the points."""
+    bins = np.arange(points[:, 2].min(), points[:, 2].max() + 0.04, 0.02)
+    count, edges = np.histogram(points[:, 2], bins)
+    level = np.flatnonzero(count > 0.3 * count.max())[0]
+    near = np.abs(points[:, 2] - edges[level] - 0.01) < 0.04
+    return float(np.median(points[near, 2]))
+
+
+def _ring_response(density: Float64, radius: float) -> Float64:
+    """Mean log density just outside a circle less that just inside, at every cell."""
+    reach = int(np.ceil(radius * 1.4)) + 1
+    x, y = np.mgrid[-reach : reach + 1, -reach : reach + 1]
+    r = np.hypot(x, y)
+    outside = ((r > radius * 1.05) & (r < radius * 1.3)).astype(float)
+    inside = ((r > radius * 0.65) & (r < radius * 0.95)).astype(float)
+    known = (density > 0.05).astype(float)
+    weight = fftconvolve(known, outside, mode="same")
+    mean_outside = fftconvolve(density, outside, mode="same") / np.maximum(weight, 1.0)
+    mean_inside = fftconvolve(density, inside / inside.sum(), mode="same")
+    full = weight > 0.6 * outside.sum()
+    return np.where(full, mean_outside - mean_inside, -np.inf)

@@ -1,0 +1,1 @@
+"""Surface reconstruction: one file a method, one signature."""

@@ -1,0 +1,76 @@
+"""Poisson: the indicator function's screened solve (Kazhdan and Hoppe 2013), by Open3D.
+
+The octree's depth follows from the room's size and the detail asked for: deeper only costs.
+The solve closes everything, windows included; ``trim`` opens them again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tourgen.errors import StageError
+from tourgen.geometry import Mesh, OrientedCloud
+
+VERSION = 1
+_SCALE = 1.1  # the solver's cube over the cloud's box
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The solve.
+
+    Attributes:
+        cell_m: Width of the octree's finest cells.
+        depth: The octree's depth, or 0 to derive it from ``cell_m``.
+        samples_per_node: Points that make a cell worth splitting; more for noisy scans.
+        point_weight: How strongly the surface is drawn through the points.
+    """
+
+    cell_m: float
+    depth: int = 0
+    samples_per_node: float = 1.5
+    point_weight: float = 4.0
+
+
+def poisson(oriented: OrientedCloud, settings: Settings) -> Mesh:
+    """Solve for the surface.
+
+    Args:
+        oriented: Points with normals toward the free space.
+        settings: See ``Settings``.
+
+    Returns:
+        A closed mesh, faces counter-clockwise seen from the free space.
+
+    Raises:
+        StageError: The solver found no surface.
+    """
+    import open3d as o3d
+
+    points = oriented.cloud.points
+    pcd = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    pcd.normals = o3d.utility.Vector3dVector(oriented.normals)
+    solved, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
+        pcd,
+        depth=settings.depth or octree_depth(points, settings.cell_m),
+        scale=_SCALE,
+        samples_per_node=settings.samples_per_node,
+        point_weight=settings.point_weight,
+    )
+    if not len(solved.triangles):
+        raise StageError(
+            "surface: expected a surface, found none", "check the normals, or thin the scan less"
+        )
+    return Mesh(
+        oriented.cloud.origin,
+        np.asarray(solved.vertices).astype(np.float32),
+        np.asarray(solved.triangles).astype(np.int32),
+    )
+
+
+def octree_depth(points: np.ndarray, cell_m: float) -> int:
+    """The least depth whose cells are no wider than ``cell_m``, from 6 to 12."""
+    side_m = _SCALE * float(np.ptp(points, axis=0).max())
+    return int(np.clip(np.ceil(np.log2(side_m / cell_m) - 0.25), 6, 12))
