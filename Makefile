@@ -6,7 +6,7 @@ DEMO := sites/lighthouse
 UV := uv==0.13.9
 PIP := --disable-pip-version-check --no-input
 
-export PATH := $(CURDIR)/$(BIN):$(PATH)
+NPM := PATH="$(CURDIR)/$(BIN):$$PATH" npm
 
 .PHONY: help
 help:
@@ -48,7 +48,9 @@ $(BIN)/python:
 
 $(VENV)/.packages: requirements/build.txt requirements/test.txt | $(BIN)/python
 	$(PYTHON) -m pip $(PIP) --python $(BIN)/python install --quiet --only-binary :all: \
-		--require-hashes -r requirements/build.txt -r requirements/test.txt
+		--require-hashes -r requirements/build.txt
+	$(BIN)/python -m pip $(PIP) install --quiet --only-binary :all: --no-binary meshoptimizer \
+		--no-build-isolation --require-hashes -r requirements/test.txt
 	@touch $@
 
 $(VENV)/.tourgen: $(VENV)/.packages pyproject.toml hatch_build.py
@@ -61,7 +63,7 @@ viewer: $(VENV)/.packages
 	@$(BIN)/python hatch_build.py
 
 tests/node_modules/.package-lock.json: tests/package-lock.json | $(VENV)/.packages
-	cd tests && npm ci --no-audit --no-fund --ignore-scripts
+	cd tests && $(NPM) ci --no-audit --no-fund --ignore-scripts
 	@touch $@
 
 # ---- What is made
@@ -108,7 +110,7 @@ lock: $(VENV)/.packages
 		-o requirements/test.txt
 	rm -rf $(VENV)-lock
 	for folder in static tests; do \
-		(cd $$folder && rm -f package-lock.json && npm install --package-lock-only --ignore-scripts); \
+		(cd $$folder && rm -f package-lock.json && $(NPM) install --package-lock-only --ignore-scripts); \
 	done
 
 .PHONY: clean

