@@ -14,6 +14,7 @@ import difflib
 import re
 import tomllib
 import types
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,6 +34,7 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from tourgen.errors import Faults, InputError
+from tourgen.scans import Scan, open_scan
 
 TOUR_FILE: Final = "tour.toml"
 UNITS: Final[Mapping[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
@@ -157,13 +159,25 @@ def _check_text_files(value: object, info: ValidationInfo) -> dict[str, str]:
     }
 
 
+def is_room_id(value: str) -> bool:
+    """Whether it serves as a folder and an address on every system."""
+    return bool(_ROOM_ID.fullmatch(value))
+
+
+def as_room_id(name: str) -> str:
+    """The room id nearest to a name: "Küche 1" becomes "kuche-1"."""
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
+    room_id = re.sub(r"[^a-z0-9_]+", "-", plain).strip("-_")[:60]
+    return room_id if is_room_id(room_id) else f"room-{room_id}".strip("-")
+
+
 def _check_room_id(value: str, info: ValidationInfo) -> str:
-    if not _ROOM_ID.fullmatch(value):
-        safe = re.sub(r"[^a-z0-9_-]+", "-", value.lower()).strip("-_")
+    if not is_room_id(value):
+        safe = as_room_id(value)
         raise _fault(
             "expected a name of a folder and an address: a-z, 0-9, - and _, at most 64 of them, "
             f"found {_shown(value)}",
-            f"for example `{safe}`" if _ROOM_ID.fullmatch(safe) else "",
+            f"for example `{safe}`",
         )
     if info.context:
         if value in info.context.seen:
@@ -199,17 +213,33 @@ def _as_reference(value: object) -> object:
     return {"file": value} if isinstance(value, str) else value
 
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Whole = Annotated[int, Field(strict=True)]
-Position = Annotated[tuple[float, float, float], BeforeValidator(_check_position)]
-Row = tuple[float, float, float, float]
-Pose = Annotated[tuple[Row, Row, Row, Row], BeforeValidator(_check_pose)]
-Stations = Annotated[
-    Literal["auto"] | tuple[tuple[float, float, float], ...], BeforeValidator(_check_stations)
+@dataclass(frozen=True)
+class Form:
+    """How the documentation writes a kind of value."""
+
+    words: str
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False), Form("number")]
+Whole = Annotated[int, Field(strict=True), Form("whole number")]
+Position = Annotated[
+    tuple[float, float, float], BeforeValidator(_check_position), Form("`[x, y, z]`")
 ]
-Text = Annotated[Mapping[str, str], BeforeValidator(_check_text)]
-TextFiles = Annotated[Mapping[str, str], BeforeValidator(_check_text_files)]
-File = Annotated[str, AfterValidator(_check_file)]
+Row = tuple[float, float, float, float]
+Pose = Annotated[
+    tuple[Row, Row, Row, Row], BeforeValidator(_check_pose), Form("four rows of four numbers")
+]
+Stations = Annotated[
+    Literal["auto"] | tuple[tuple[float, float, float], ...],
+    BeforeValidator(_check_stations),
+    Form('`"auto"` or a list of `[x, y, z]`'),
+]
+Text = Annotated[Mapping[str, str], BeforeValidator(_check_text), Form("text")]
+TextFiles = Annotated[
+    Mapping[str, str], BeforeValidator(_check_text_files), Form("file name, or table by language")
+]
+File = Annotated[str, AfterValidator(_check_file), Form("file name")]
+RoomId = Annotated[str, Form("id of a room")]
 
 
 # ------------------------------------------------------------------ tables
@@ -315,7 +345,7 @@ class Texture(_Table):
 class Link(_Table):
     """A door to another room."""
 
-    to: Annotated[str, AfterValidator(_check_neighbour)] = Field(
+    to: Annotated[RoomId, AfterValidator(_check_neighbour)] = Field(
         description="The room behind the door, by its `id`."
     )
     at: Position = Field(description="Where the door's mark stands in this room, metres.")
@@ -341,7 +371,7 @@ class Note(_Table):
 class Room(_Table):
     """A room of the tour."""
 
-    id: Annotated[str, AfterValidator(_check_room_id)] = Field(
+    id: Annotated[RoomId, AfterValidator(_check_room_id)] = Field(
         description="Name of the room's folder and address: a-z, 0-9, - and _."
     )
     title: Text = Field(default={}, description="The room's name. Left out: its `id`.")
@@ -366,6 +396,11 @@ class Room(_Table):
         default=(),
         description="Points inside these boxes are dropped: people, furniture, what is seen "
         "through a window.",
+    )
+    closed: tuple[Box, ...] = Field(
+        default=(),
+        description="Inside these boxes every gap of the surface is closed: mirrors, black "
+        "screens and glass, which a scanner looks through.",
     )
     text: TextFiles = Field(
         default={},
@@ -394,7 +429,7 @@ class Room(_Table):
         return UNITS[self.unit]
 
 
-class _Head(_Table):
+class TourHead(_Table):
     """The tour as a whole."""
 
     title: Text = Field(description="The tour's name.")
@@ -403,7 +438,7 @@ class _Head(_Table):
         min_length=1,
         description="Codes of the languages that the texts are in; the first one is shown first.",
     )
-    start: Annotated[str, AfterValidator(_check_target)] | None = Field(
+    start: Annotated[RoomId, AfterValidator(_check_target)] | None = Field(
         default=None, description="The room in which the tour starts. Left out: the first one."
     )
 
@@ -411,7 +446,7 @@ class _Head(_Table):
 class _File(_Table):
     """A tour file."""
 
-    tour: _Head = Field(description="The tour as a whole.")
+    tour: TourHead = Field(description="The tour as a whole.")
     room: tuple[Room, ...] = Field(min_length=1, description="The rooms.")
 
 
@@ -529,6 +564,70 @@ def _context(folder: Path, data: Mapping[str, Any]) -> _Context:
         tuple(languages) if valid else (),
         tuple(name for name in ids if isinstance(name, str)),
     )
+
+
+# ------------------------------------------------------------------ scans
+
+
+def open_scans(room: Room, folder: Path) -> tuple[Scan, ...]:
+    """Read the headers of a room's scans.
+
+    Args:
+        room: The room.
+        folder: Where its paths start.
+
+    Raises:
+        InputError: A scan cannot be read; the first one that cannot.
+    """
+    return tuple(_open(room, scan, folder) for scan in room.scans)
+
+
+def check_scans(tour: Tour) -> tuple[str, ...]:
+    """Read the headers of all scans.
+
+    Returns:
+        What the publisher should know although a build will succeed, one line each.
+
+    Raises:
+        Faults: Every scan that cannot be read, every room of too few points.
+    """
+    faults: list[InputError] = []
+    warnings: list[str] = []
+    for room in tour.rooms:
+        scans: list[Scan] = []
+        for reference in room.scans:
+            try:
+                scans.append(_open(room, reference, tour.folder))
+            except InputError as fault:
+                faults.append(fault)
+        warnings += (f"room `{room.id}`: {each}" for scan in scans for each in scan.warnings)
+        found = sum(scan.point_count for scan in scans)
+        if len(scans) == len(room.scans) and found < room.clean.min_points:
+            names = " + ".join(f"`{scan.name}`" for scan in scans)
+            faults.append(
+                InputError(
+                    f"room `{room.id}`: scan {names}: expected at least {room.clean.min_points} "
+                    f"points, found {found}",
+                    "check the export, or lower `clean.min_points`",
+                )
+            )
+    if faults:
+        raise Faults(tuple(faults))
+    return tuple(warnings)
+
+
+def _open(room: Room, scan: ScanRef, folder: Path) -> Scan:
+    try:
+        return open_scan(
+            folder / scan.file,
+            room.unit_m,
+            room.up,
+            name=scan.file,
+            pose=scan.pose,
+            station=scan.station,
+        )
+    except InputError as error:
+        raise InputError(f"room `{room.id}`: {error.message}", error.hint) from None
 
 
 # ------------------------------------------------------------------ faults
