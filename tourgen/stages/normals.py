@@ -63,6 +63,12 @@ def normals(cloud: PointCloud, stations: Float64, settings: Settings) -> Oriente
     return OrientedCloud(cloud, normal, stations)
 
 
+def spread(oriented: OrientedCloud, full: PointCloud) -> OrientedCloud:
+    """Give each point of the unthinned cloud the normal of the nearest thinned one."""
+    _, near = cKDTree(oriented.cloud.points).query(full.points, workers=-1)
+    return OrientedCloud(full, oriented.normals[near], oriented.stations)
+
+
 def _tangent_planes(points: Float32, neighbours: int) -> Float32:
     import open3d as o3d
 

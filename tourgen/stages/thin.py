@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, PointCloud
 
@@ -67,21 +66,3 @@ def voxel_groups(
     starts = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
     return order, starts
 
-
-def spacing_m(points: Float32, share: float = 0.5, sample: int = 20_000) -> float:
-    """Distance from a point to its nearest neighbour on the surface, as a quantile.
-
-    The nearest neighbour of a random sampling lies at half the spacing of a regular grid of the
-    same density (Clark and Evans 1954), hence the factor.
-
-    Args:
-        points: (n, 3).
-        share: The quantile over space: each occupied 10 cm voxel counts once, so that the dense
-            floor by the tripod does not speak for the room.
-        sample: How many points to look at.
-    """
-    order, starts = voxel_groups(points, 0.1)
-    rng = np.random.default_rng(0)
-    chosen = order[rng.choice(starts, min(sample, len(starts)), replace=False)]
-    distance, _ = cKDTree(points).query(points[chosen], k=2, workers=-1)
-    return float(2 * np.quantile(distance[:, 1], share))

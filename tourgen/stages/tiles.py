@@ -2,7 +2,7 @@
 
 Faces are divided by a k-d tree over their centroids, down to leaves of ``leaf_faces``. A branch
 takes its children's faces, welds them and simplifies them with the branch's outer border locked
-(meshoptimizer's LockBorder). Every border is thus the same polyline at all levels: tiles of any
+(fast-simplification's ``preserve_border``). Every border is thus the same polyline at all levels: tiles of any
 levels meet exactly, without skirts, and nothing can poke through thin things. The price is full
 resolution along the borders of coarse tiles, a few per cent of the faces.
 
@@ -95,9 +95,10 @@ def _subtree(
         return (Tile(name, compact(finest, faces), 0.0, ()),)
     below = _children(name, finest, centre, faces, leaves, settings)
     tops = [subtree[0] for subtree in below]
-    mesh, own_error_m = _simplify_locked(weld([top.mesh for top in tops]), settings.branch_ratio)
-    error_m = own_error_m + max(top.geometric_error_m for top in tops)
-    top = Tile(name, mesh, max(error_m, 1e-4), tuple(child.id for child in tops))
+    fine = weld([top.mesh for top in tops])
+    mesh = _simplify_locked(fine, settings.branch_ratio)
+    error_m = max(_deviation_m(fine, mesh), 1e-4) + max(top.geometric_error_m for top in tops)
+    top = Tile(name, mesh, error_m, tuple(child.id for child in tops))
     return (top, *(tile for subtree in below for tile in subtree))
 
 
@@ -117,24 +118,18 @@ def _split(
     )
 
 
-def _simplify_locked(mesh: Mesh, ratio: float) -> tuple[Mesh, float]:
-    """Simplify without moving the border; also the error made, metres."""
-    import meshoptimizer
+def _simplify_locked(mesh: Mesh, ratio: float) -> Mesh:
+    """Simplify without touching the border."""
+    import fast_simplification
 
-    source = np.ascontiguousarray(mesh.faces.reshape(-1), np.uint32)
-    target = np.zeros_like(source)
-    error_m = np.zeros(1, np.float32)
-    count = meshoptimizer.simplify(
-        target,
-        source,
-        np.ascontiguousarray(mesh.vertices),
-        target_index_count=int(len(mesh.faces) * ratio) * 3,
-        target_error=1.0,
-        options=meshoptimizer.SIMPLIFY_LOCK_BORDER | meshoptimizer.SIMPLIFY_ERROR_ABSOLUTE,
-        result_error=error_m,
+    vertices, faces = fast_simplification.simplify(
+        mesh.vertices,
+        mesh.faces,
+        target_count=int(len(mesh.faces) * ratio),
+        agg=5,
+        preserve_border=True,
     )
-    faces = target[:count].reshape(-1, 3).astype(np.int32)
-    return compact(Mesh(mesh.origin, mesh.vertices, faces), np.arange(len(faces))), float(error_m[0])
+    return Mesh(mesh.origin, vertices.astype(np.float32), faces.astype(np.int32))
 
 
 def _deviation_m(fine: Mesh, coarse: Mesh) -> float:

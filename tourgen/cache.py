@@ -1,0 +1,169 @@
+"""The cache: what a stage made, kept under a key of everything that it was made from.
+
+A key is the digest of its *ingredients*: the stage's name and version, the versions of the
+libraries it calls, its settings, and the keys of what it was fed. Thread counts, paths and log
+levels never enter. Entries are written aside and renamed, and carry a digest of their own: an
+entry cut short or flipped counts as absent.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import pickle
+import shutil
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+Ingredients = Mapping[str, Any]
+
+_FOLDER = ".tourgen"
+_LIMIT_BYTES = 40 * 2**30
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What making a result took.
+
+    Attributes:
+        seconds: Wall time.
+        peak_rss_mb: Highest resident memory of the process meanwhile.
+    """
+
+    seconds: float
+    peak_rss_mb: float
+
+
+def key_of(ingredients: Ingredients) -> str:
+    """The key of a result made from these ingredients."""
+    text = json.dumps(ingredients, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@lru_cache
+def library_version(name: str) -> str:
+    """Version of an installed library; Open3D goes by two names."""
+    for distribution in (name, f"{name}-cpu"):
+        try:
+            return version(distribution)
+        except PackageNotFoundError:
+            continue
+    return "absent"
+
+
+class Cache:
+    """The results of one tour, in ``DIR/.tourgen``."""
+
+    def __init__(self, tour_folder: Path) -> None:
+        self._root = tour_folder / _FOLDER
+        self._results = self._root / "results"
+
+    def has(self, key: str) -> bool:
+        """Whether there is an entry."""
+        return (self._results / key).is_dir()
+
+    def cost(self, key: str) -> Cost | None:
+        """What the entry cost to make; None where there is none."""
+        try:
+            about = json.loads((self._results / key / "about.json").read_text())
+        except (OSError, ValueError):
+            return None
+        return Cost(**about["cost"])
+
+    def load(self, key: str) -> Any:
+        """The result; None where there is none that is whole."""
+        folder = self._results / key
+        try:
+            about = json.loads((folder / "about.json").read_text())
+            data = (folder / "result.pickle").read_bytes()
+        except (OSError, ValueError):
+            return None
+        if hashlib.sha256(data).hexdigest() != about["sha256"]:
+            shutil.rmtree(folder, ignore_errors=True)
+            return None
+        os.utime(folder)
+        return pickle.loads(data)
+
+    def store(self, key: str, result: Any, cost: Cost) -> None:
+        """Keep a result; a second store of one key changes nothing."""
+        self._results.mkdir(parents=True, exist_ok=True)
+        aside = Path(tempfile.mkdtemp(prefix="aside-", dir=self._results))
+        data = pickle.dumps(result, protocol=5)
+        (aside / "result.pickle").write_bytes(data)
+        about = {
+            "sha256": hashlib.sha256(data).hexdigest(),
+            "cost": {"seconds": cost.seconds, "peak_rss_mb": cost.peak_rss_mb},
+        }
+        (aside / "about.json").write_text(json.dumps(about))
+        try:
+            aside.rename(self._results / key)
+        except OSError:  # another process stored it first
+            shutil.rmtree(aside)
+
+    def prune(self, keep: frozenset[str], limit_bytes: int = _LIMIT_BYTES) -> None:
+        """Drop leftovers of killed builds, then the longest unused entries over the limit."""
+        if not self._results.is_dir():
+            return
+        entries = []
+        for folder in self._results.iterdir():
+            if folder.name.startswith("aside-"):
+                shutil.rmtree(folder, ignore_errors=True)
+                continue
+            size = sum(file.stat().st_size for file in folder.iterdir())
+            entries.append((folder.name in keep, folder.stat().st_mtime, size, folder))
+        total = sum(entry[2] for entry in entries)
+        for kept, _, size, folder in sorted(entries, key=lambda entry: entry[:2]):
+            if kept or total <= limit_bytes:
+                break
+            shutil.rmtree(folder, ignore_errors=True)
+            total -= size
+
+    def clear(self) -> int:
+        """Drop everything; returns the bytes freed."""
+        size = sum(file.stat().st_size for file in self._root.rglob("*") if file.is_file())
+        shutil.rmtree(self._root, ignore_errors=True)
+        return size
+
+    def last_ingredients(self, room_id: str) -> dict[str, Ingredients]:
+        """What each stage of a room was last made from, by stage."""
+        return self._read_json(f"last/{room_id}.json")
+
+    def remember_ingredients(self, room_id: str, stages: Mapping[str, Ingredients]) -> None:
+        """Keep what a room's stages were made from, so that a plan can tell what changed."""
+        self._write_json(f"last/{room_id}.json", stages)
+
+    def file_digests(self, files: list[Path]) -> dict[Path, str]:
+        """The digest of each file's contents, remembered by its size and time of change."""
+        known = self._read_json("digests.json")
+        digests = {}
+        for file in files:
+            stat = file.stat()
+            stamp = f"{stat.st_size}-{stat.st_mtime_ns}"
+            entry = known.get(str(file))
+            if entry is None or entry["stamp"] != stamp:
+                with file.open("rb") as stream:
+                    digest = hashlib.file_digest(stream, "sha256").hexdigest()
+                known[str(file)] = entry = {"stamp": stamp, "sha256": digest}
+            digests[file] = entry["sha256"]
+        self._write_json("digests.json", known)
+        return digests
+
+    def _read_json(self, name: str) -> dict[str, Any]:
+        try:
+            content = json.loads((self._root / name).read_text())
+        except (OSError, ValueError):
+            return {}
+        return content if isinstance(content, dict) else {}
+
+    def _write_json(self, name: str, content: Mapping[str, Any]) -> None:
+        target = self._root / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        aside = target.with_suffix(f".{os.getpid()}.aside")
+        aside.write_text(json.dumps(content))
+        aside.replace(target)

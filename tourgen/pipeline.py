@@ -1,0 +1,297 @@
+"""The recipe: which stage follows which, from a room's scans to its published files.
+
+``room_recipe`` names every stage of a room with its inputs and settings, and thereby its key, and
+runs nothing; ``build_room`` runs what is missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from tourgen import fitting
+from tourgen.cache import Cache, Cost
+from tourgen.geometry import UInt8, View
+from tourgen.progress import Listener, Started
+from tourgen.stages import (
+    bake,
+    clean,
+    entry,
+    hygiene,
+    levels,
+    measure,
+    normals,
+    pack,
+    poster,
+    spacing,
+    stations,
+    thin,
+    tiles,
+    trim,
+    unwrap,
+)
+from tourgen.stages.surface import poisson
+from tourgen.tasks import Runner, Task, in_order, missing_tasks, task, why
+from tourgen.tour import Room, Tour
+
+
+@dataclass(frozen=True, slots=True)
+class RoomRecipe:
+    """The tasks whose results are published.
+
+    Attributes:
+        room: The room.
+        scan_mb: Size of its scans, megabytes.
+        files: Published files by path below the room's folder.
+        poster: (h, w, 3) picture of the first view.
+        entry: The first view.
+        quality: How well the surface follows the scan.
+        summary: The room in figures.
+    """
+
+    room: Room
+    scan_mb: float
+    files: Task[Mapping[str, bytes]]
+    poster: Task[UInt8]
+    entry: Task[View]
+    quality: Task[measure.Quality]
+    summary: Task[fitting.Summary]
+
+    @property
+    def goals(self) -> tuple[Task[Any], ...]:
+        """All of them."""
+        return (self.files, self.poster, self.entry, self.quality, self.summary)
+
+
+def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRecipe:
+    """Name every stage of a room.
+
+    Args:
+        room: What tour.toml says.
+        folder: Where its paths start.
+        digests: Of the scans' contents, by path.
+    """
+    detail_mm = room.surface.detail_mm
+    scanned = task(
+        "scan",
+        partial(fitting.read, room, folder),
+        settings=fitting.reading(room),
+        digests=tuple(digests[folder / each.file] for each in room.scans),
+        version=1,
+        libraries=("pye57",),
+    )
+    cleaned = task(
+        "clean",
+        fitting.cleaned,
+        scanned,
+        settings=clean.Settings(min_points=room.clean.min_points),
+        version=clean.VERSION,
+        libraries=("scipy",),
+    )
+    spaced = task("spacing", spacing.spacing, cleaned, version=spacing.VERSION)
+    stood = task(
+        "stations",
+        fitting.stations_of,
+        scanned,
+        cleaned,
+        settings=stations.Settings(),
+        version=stations.VERSION,
+        libraries=("scipy",),
+    )
+    thinned = task(
+        "thin",
+        fitting.thinned,
+        cleaned,
+        spaced,
+        settings=fitting.Thinning(detail_mm, room.clean.thin_mm),
+        version=thin.VERSION,
+    )
+    oriented = task(
+        "normals",
+        normals.normals,
+        thinned,
+        stood,
+        settings=normals.Settings(),
+        version=normals.VERSION,
+        libraries=("open3d", "scipy"),
+    )
+    solved = task(
+        "surface",
+        fitting.solved,
+        oriented,
+        spaced,
+        settings=fitting.Solving(detail_mm, room.surface.depth),
+        version=poisson.VERSION,
+        libraries=("open3d",),
+    )
+    trimmed = task(
+        "trim",
+        fitting.trimmed,
+        solved,
+        oriented,
+        cleaned,
+        spaced,
+        settings=fitting.Trimming(fitting.boxes(room.closed)),
+        version=trim.VERSION,
+        libraries=("scipy",),
+    )
+    sound = task(
+        "hygiene",
+        hygiene.hygiene,
+        trimmed,
+        settings=hygiene.Settings(),
+        version=hygiene.VERSION,
+        libraries=("trimesh",),
+    )
+    simplified = task(
+        "levels",
+        fitting.levelled,
+        sound,
+        spaced,
+        settings=fitting.Detail(detail_mm),
+        version=levels.VERSION,
+        libraries=("fast-simplification",),
+    )
+    tree = task(
+        "tiles",
+        tiles.tiles,
+        simplified,
+        settings=tiles.Settings(),
+        version=tiles.VERSION,
+        libraries=("fast-simplification",),
+    )
+    unwrapped = task(
+        "unwrap",
+        fitting.unwrapped,
+        tree,
+        cleaned,
+        settings=fitting.Texels(room.texture.texel_mm),
+        version=unwrap.VERSION,
+        libraries=("xatlas", "scipy"),
+    )
+    baked = task(
+        "bake",
+        fitting.baked,
+        unwrapped,
+        oriented,
+        cleaned,
+        settings=bake.Settings(),
+        version=bake.VERSION,
+        libraries=("scipy",),
+    )
+    files = task(
+        "pack",
+        fitting.packed,
+        tree,
+        baked,
+        settings=fitting.Packing(room.texture.quality),
+        version=pack.VERSION,
+        libraries=("DracoPy", "pygltflib", "pillow"),
+    )
+    entered = task(
+        "entry",
+        fitting.entered,
+        simplified,
+        stood,
+        settings=fitting.entering(room.start),
+        version=entry.VERSION,
+        libraries=("open3d",),
+    )
+    pictured = task(
+        "poster",
+        fitting.pictured,
+        tree,
+        baked,
+        entered,
+        settings=poster.Settings(),
+        version=poster.VERSION,
+        libraries=("open3d",),
+    )
+    measured = task(
+        "measure",
+        fitting.measured,
+        simplified,
+        cleaned,
+        spaced,
+        version=measure.VERSION,
+        libraries=("open3d", "scipy"),
+    )
+    summary = task(
+        "summary", fitting.summarised, scanned, cleaned, stood, tree, files, version=1
+    )
+    scan_mb = sum((folder / each.file).stat().st_size for each in room.scans) / 1e6
+    return RoomRecipe(room, scan_mb, files, pictured, entered, measured, summary)
+
+
+@dataclass(frozen=True, slots=True)
+class RoomResult:
+    """What a build made of one room.
+
+    Attributes:
+        id: The room.
+        files: Published files by path below the room's folder.
+        poster: (h, w, 3) uint8.
+        entry: The first view.
+        quality: How well the surface follows the scan.
+        summary: The room in figures.
+        costs: Of every stage, when it last ran, in the order of the recipe.
+        ran: The stages that ran this time.
+    """
+
+    id: str
+    files: Mapping[str, bytes]
+    poster: UInt8
+    entry: View
+    quality: measure.Quality
+    summary: fitting.Summary
+    costs: Mapping[str, Cost]
+    ran: tuple[str, ...]
+
+
+def tour_recipes(tour: Tour, cache: Cache) -> tuple[RoomRecipe, ...]:
+    """The recipe of every room."""
+    files = [tour.folder / scan.file for room in tour.rooms for scan in room.scans]
+    digests = cache.file_digests(files)
+    return tuple(room_recipe(room, tour.folder, digests) for room in tour.rooms)
+
+
+def planned(recipe: RoomRecipe, cache: Cache) -> tuple[tuple[str, str], ...]:
+    """The stages of a room that a build would run, each with the reason."""
+    before = cache.last_ingredients(recipe.room.id)
+    return tuple((each.name, why(each, before)) for each in missing_tasks(cache, recipe.goals))
+
+
+def build_room(recipe: RoomRecipe, cache: Cache, listener: Listener) -> RoomResult:
+    """Run what is missing of a room's recipe.
+
+    Args:
+        recipe: The room's.
+        cache: Of the tour.
+        listener: Told each stage that starts.
+    """
+    waiting = tuple(each.name for each in missing_tasks(cache, recipe.goals))
+
+    def announce(each: Task[Any]) -> None:
+        ahead = waiting[waiting.index(each.name) :] if each.name in waiting else (each.name,)
+        listener(Started(recipe.room.id, each.name, ahead, recipe.scan_mb))
+
+    runner = Runner(cache, recipe.goals, announce)
+    runner.run()
+    result = RoomResult(
+        recipe.room.id,
+        runner.result(recipe.files),
+        runner.result(recipe.poster),
+        runner.result(recipe.entry),
+        runner.result(recipe.quality),
+        runner.result(recipe.summary),
+        {each.name: cache.cost(each.key) or Cost(0, 0) for each in in_order(recipe.goals)},
+        tuple(runner.ran),
+    )
+    cache.remember_ingredients(
+        recipe.room.id, {each.name: each.ingredients for each in in_order(recipe.goals)}
+    )
+    listener(Started(recipe.room.id, "", (), recipe.scan_mb))
+    return result
