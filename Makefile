@@ -48,9 +48,7 @@ $(BIN)/python:
 
 $(VENV)/.packages: requirements/build.txt requirements/test.txt | $(BIN)/python
 	$(PYTHON) -m pip $(PIP) --python $(BIN)/python install --quiet --only-binary :all: \
-		--require-hashes -r requirements/build.txt
-	$(BIN)/python -m pip $(PIP) install --quiet --only-binary :all: --no-binary meshoptimizer \
-		--no-build-isolation --require-hashes -r requirements/test.txt
+		--require-hashes -r requirements/build.txt -r requirements/test.txt
 	@touch $@
 
 $(VENV)/.tourgen: $(VENV)/.packages pyproject.toml hatch_build.py
@@ -82,6 +80,7 @@ pictures: demo system-tests
 
 .PHONY: test
 test: install system-tests tests/node_modules/.package-lock.json
+	cd static && $(NPM) test
 	$(BIN)/pytest --numprocesses 2 --dist loadgroup
 
 .PHONY: lint
@@ -89,6 +88,7 @@ lint: install
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	cd static && $(NPM) run check
 
 .PHONY: bench
 bench: demo

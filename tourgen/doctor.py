@@ -7,11 +7,9 @@ Runs before anything is installed: it imports the standard library alone, and th
 from __future__ import annotations
 
 import ctypes
-import importlib.util
 import os
 import shutil
 import sys
-import sysconfig
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,7 +61,7 @@ def findings(folder: Path, *, tests: bool = False) -> list[Finding]:
     Returns:
         One finding for each thing lacking; none where all is well.
     """
-    found = [*_libraries(), *_compiler(), *_disk(folder), *_memory()]
+    found = [*_libraries(), *_disk(folder), *_memory()]
     if tests and browser() is None:
         found.append(
             Finding(
@@ -91,17 +89,6 @@ def _libraries() -> Iterator[Finding]:
         except OSError as error:
             mend = _install_line(package, of=library)
             yield Finding(library, f"needed by Open3D, {error}", mend, package)
-
-
-def _compiler() -> Iterator[Finding]:
-    if importlib.util.find_spec("meshoptimizer"):
-        return
-    if not shutil.which("c++"):
-        mend = _install_line("g++", of="a C++ compiler")
-        yield Finding("c++", "needed to build meshoptimizer, not found on the path", mend, "g++")
-    if not Path(sysconfig.get_path("include"), "Python.h").is_file():
-        mend = _install_line("python3-dev", of="Python.h")
-        yield Finding("Python.h", "needed to build meshoptimizer, not found", mend, "python3-dev")
 
 
 def _install_line(package: str, *, of: str) -> str:
