@@ -1,6 +1,210 @@
 """The commands: parse, call, print; no logic."""
 
+from __future__ import annotations
 
-def main() -> int:
-    """Run tourgen."""
+import argparse
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from tourgen import __version__
+from tourgen.errors import Faults, InputError, TourgenError
+
+OUTPUT = "site"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run tourgen.
+
+    Args:
+        arguments: Of the command line; those of this process if left out.
+
+    Returns:
+        The exit code: 0 done, 1 a room failed or this machine lacks something, 2 bad input.
+    """
+    asked = _parser().parse_args(arguments)
+    command: Callable[[argparse.Namespace], int] = asked.command
+    try:
+        return command(asked)
+    except TourgenError as error:
+        _tell(error)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("stopped; the next build goes on from the last finished stage", file=sys.stderr)
+        return 130
+
+
+def _tell(error: TourgenError) -> None:
+    for each in _each(error):
+        print(f"error: {each.message}", file=sys.stderr)
+        if each.hint:
+            print(f"\nhint: {each.hint}\n", file=sys.stderr)
+
+
+def _each(error: TourgenError) -> tuple[TourgenError, ...]:
+    return getattr(error, "faults", None) or getattr(error, "errors", None) or (error,)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="tourgen", description="Raw laser scans of rooms in, a virtual tour out."
+    )
+    parser.add_argument("--version", action="version", version=f"tourgen {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    def add(name: str, run: Callable[[argparse.Namespace], int], text: str, folder: str) -> Any:
+        command = commands.add_parser(name, help=text, description=text)
+        command.set_defaults(command=run)
+        if folder:
+            command.add_argument("folder", type=Path, metavar=folder)
+        return command
+
+    add("new", _new, "Write a commented tour.toml for the scans found in DIR.", "DIR")
+    check = add("check", _check, "Read tour.toml and the scans' headers; tell every fault.", "DIR")
+    plan = add("plan", _plan, "Say what a build would do, and why.", "DIR")
+    build = add("build", _build, "Build the tour's website.", "DIR")
+    serve = add("serve", _serve, "Serve a tour on this machine.", "DIR-or-SITE")
+    add("clean", _clean, "Drop the cache of a tour.", "DIR")
+    doctor = add("doctor", _doctor, "Say what this machine lacks, and how to mend it.", "")
+    build.add_argument(
+        "-o", "--output", type=Path, metavar="OUT", help="the site's folder (DIR/site)"
+    )
+    build.add_argument(
+        "--room", action="append", default=[], metavar="ID", help="build only this room; repeatable"
+    )
+    build.add_argument(
+        "--jobs", type=_positive, metavar="N", help="rooms built at once (one a core)"
+    )
+    serve.add_argument("--port", type=_positive, default=8000, help="port (8000)")
+    for command in (check, plan, build, doctor):
+        command.add_argument("--json", action="store_true", help="print JSON")
+    return parser
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"expected at least 1, found {number}")
+    return number
+
+
+def _print_json(content: Any) -> None:
+    print(json.dumps(content, indent=2, ensure_ascii=False))
+
+
+def _new(asked: argparse.Namespace) -> int:
+    from tourgen.reference import starter
+    from tourgen.tour import TOUR_FILE
+
+    target = asked.folder / TOUR_FILE
+    if target.exists():
+        raise InputError(f"`{target}`: expected no file, found one", "edit it, or move it away")
+    target.write_text(starter(asked.folder), encoding="utf-8")
+    print(f"wrote {target}; now: tourgen build {asked.folder}")
     return 0
+
+
+def _check(asked: argparse.Namespace) -> int:
+    from tourgen.tour import check_scans, load_tour
+
+    try:
+        tour = load_tour(asked.folder)
+        warnings = check_scans(tour)
+    except Faults as faults:
+        if not asked.json:
+            raise
+        _print_json({"faults": [{"message": f.message, "hint": f.hint} for f in faults.faults]})
+        return faults.exit_code
+    if asked.json:
+        _print_json({"faults": [], "warnings": warnings})
+        return 0
+    for warning in warnings:
+        print(f"warning: {warning}")
+    print(f"{len(tour.rooms)} rooms, no fault; now: tourgen build {asked.folder}")
+    return 0
+
+
+def _plan(asked: argparse.Namespace) -> int:
+    from tourgen.build import plan_tour
+    from tourgen.tour import check_scans, load_tour
+
+    tour = load_tour(asked.folder)
+    check_scans(tour)
+    rooms = plan_tour(tour)
+    if asked.json:
+        _print_json({room.room: dict(room.stages) for room in rooms})
+        return 0
+    for room in rooms:
+        if not room.stages:
+            print(f"{room.room}: nothing to do")
+        for stage, reason in room.stages:
+            print(f"{room.room}: {stage}: {reason}")
+    return 0
+
+
+def _build(asked: argparse.Namespace) -> int:
+    from tourgen.build import build_tour
+    from tourgen.progress import ProgressBars
+    from tourgen.tour import load_tour
+
+    tour = load_tour(asked.folder)
+    out = asked.output or asked.folder / OUTPUT
+    with ProgressBars() as bars:
+        report = build_tour(tour, out, bars, only=asked.room, jobs=asked.jobs)
+    if asked.json:
+        _print_json(report)
+        return 0
+    for room_id, room in report["rooms"].items():
+        for warning in room["warnings"]:
+            print(f"warning: room `{room_id}`: {warning}")
+    print(
+        f"built {out}: {len(report['rooms'])} rooms, {report['total_bytes'] / 1e6:.1f} MB, "
+        f"{report['ran_stages']} stages run, {report['cached_stages']} from the cache, "
+        f"{report['seconds']:.1f} s"
+    )
+    print(f"to walk through it: tourgen serve {asked.folder if not asked.output else out}")
+    return 0
+
+
+def _serve(asked: argparse.Namespace) -> int:
+    from tourgen.serve import serve
+    from tourgen.site import is_site
+
+    site = asked.folder if is_site(asked.folder) else asked.folder / OUTPUT
+    if not is_site(site):
+        raise InputError(
+            f"`{asked.folder}`: expected a tour's site, found none",
+            f"build it first: tourgen build {asked.folder}",
+        )
+    serve(site, "127.0.0.1", asked.port)
+    return 0
+
+
+def _clean(asked: argparse.Namespace) -> int:
+    from tourgen.cache import Cache
+    from tourgen.tour import TOUR_FILE
+
+    if not (asked.folder / TOUR_FILE).is_file():
+        raise InputError(f"`{asked.folder}`: expected a folder with a {TOUR_FILE}, found none")
+    freed = Cache(asked.folder).clear()
+    print(f"dropped the cache of {asked.folder}: {freed / 1e6:.1f} MB")
+    return 0
+
+
+def _doctor(asked: argparse.Namespace) -> int:
+    from tourgen.doctor import findings
+
+    found = findings(Path.cwd())
+    if asked.json:
+        _print_json([{"subject": f.subject, "fault": f.fault, "mend": f.mend} for f in found])
+    elif not found:
+        print("nothing is lacking")
+    for each in [] if asked.json else found:
+        print(f"{each.subject}: {each.fault}\n\nhint: {each.mend}\n")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -26,14 +26,13 @@ from tourgen.geometry import (
     UvMesh,
     View,
 )
-from tourgen.scans import ReadFacts, open_scan, read_room
+from tourgen.scans import ReadFacts, read_room
 from tourgen.stages import (
     bake,
     clean,
     entry,
     levels,
     measure,
-    normals,
     pack,
     poster,
     stations,
@@ -45,7 +44,7 @@ from tourgen.stages.mesh_arrays import face_areas
 from tourgen.stages.spacing import Spacing, spacing_at
 from tourgen.stages.surface import poisson
 from tourgen.tileset import tileset_json
-from tourgen.tour import Box, Room, Viewpoint
+from tourgen.tour import Box, Room, Viewpoint, open_scans
 
 _FINEST_DETAIL_M = 0.004
 _ROOT_TEXELS = 600_000
@@ -186,25 +185,13 @@ def entering(start: Viewpoint | None) -> Entering:
 
 def read(room: Room, folder: Path) -> RoomScan:
     """Read a room's scans."""
-    scans = [
-        open_scan(
-            folder / each.file,
-            room.unit_m,
-            room.up,
-            name=each.file,
-            pose=each.pose,
-            station=each.station,
-        )
-        for each in room.scans
-    ]
+    scans = open_scans(room, folder)
     cloud, found, facts = read_room(scans, room.keep, room.remove, room.clean.min_points)
     if room.stations == "auto":
         return RoomScan(cloud, found, facts)
     given = np.array(room.stations, np.float64) - cloud.origin
     owner = cloud.station if len(found) == len(given) else np.full_like(cloud.station, -1)
-    return RoomScan(
-        PointCloud(cloud.origin, cloud.points, cloud.colors, owner), given, facts
-    )
+    return RoomScan(PointCloud(cloud.origin, cloud.points, cloud.colors, owner), given, facts)
 
 
 def cleaned(scan: RoomScan, settings: clean.Settings) -> PointCloud:
@@ -246,10 +233,15 @@ def trimmed(
 ) -> Mesh:
     """Open the openings."""
     closed = tuple(
-        (tuple(np.subtract(low, mesh.origin)), tuple(np.subtract(high, mesh.origin)))
+        (_from_origin(low, mesh.origin), _from_origin(high, mesh.origin))
         for low, high in asked.closed
     )
     return trim.trim(mesh, oriented, cloud, trim.Settings(support_m(spacing), closed=closed))
+
+
+def _from_origin(corner: Corner, origin: Float64) -> Corner:
+    x, y, z = (float(value) for value in np.subtract(corner, origin))
+    return x, y, z
 
 
 def levelled(mesh: Mesh, spacing: Spacing, asked: Detail) -> levels.Levels:
@@ -303,7 +295,8 @@ def baked(
     settings: bake.Settings,
 ) -> tuple[TexturedMesh, ...]:
     """Bake each tile's picture from the full cloud."""
-    index = bake.color_index(normals.spread(oriented, cloud))
+    finest_m = min(each.texel_m for each in unwrapped_tiles)
+    index = bake.color_index(cloud, oriented, finest_m)
     return tuple(bake.bake(each, index, settings) for each in unwrapped_tiles)
 
 
@@ -339,9 +332,7 @@ def pictured(
     return poster.poster(leaves, view, settings)
 
 
-def measured(
-    simplified: levels.Levels, cloud: PointCloud, spacing: Spacing
-) -> measure.Quality:
+def measured(simplified: levels.Levels, cloud: PointCloud, spacing: Spacing) -> measure.Quality:
     """Compare the finest mesh with the scan."""
     return measure.measure(simplified.finest, cloud, measure.Settings(support_m(spacing)))
 

@@ -65,6 +65,11 @@ class RoomRecipe:
         """All of them."""
         return (self.files, self.poster, self.entry, self.quality, self.summary)
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Of every stage, inputs first."""
+        return tuple(each.key for each in in_order(self.goals))
+
 
 def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRecipe:
     """Name every stage of a room.
@@ -219,9 +224,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         version=measure.VERSION,
         libraries=("open3d", "scipy"),
     )
-    summary = task(
-        "summary", fitting.summarised, scanned, cleaned, stood, tree, files, version=1
-    )
+    summary = task("summary", fitting.summarised, scanned, cleaned, stood, tree, files, version=1)
     scan_mb = sum((folder / each.file).stat().st_size for each in room.scans) / 1e6
     return RoomRecipe(room, scan_mb, files, pictured, entered, measured, summary)
 

@@ -155,18 +155,14 @@ def why(each: Task[Any], before: Mapping[str, Ingredients]) -> str:
     if last["files"] != each.ingredients["files"]:
         changes.append("the scan's file changed")
     changed = [
-        name
-        for name, key in each.ingredients["inputs"].items()
-        if last["inputs"].get(name) != key
+        name for name, key in each.ingredients["inputs"].items() if last["inputs"].get(name) != key
     ]
     if not changes and changed:
         changes.append(f"after {', '.join(changed)}")
     return ", ".join(changes) or "its result is no longer in the cache"
 
 
-def _changes(
-    last: Ingredients, now: Ingredients, sections: tuple[str, ...]
-) -> Iterator[str]:
+def _changes(last: Ingredients, now: Ingredients, sections: tuple[str, ...]) -> Iterator[str]:
     for section in sections:
         old, new = _flat(last[section], section), _flat(now[section], section)
         for name in sorted(old | new):

@@ -57,9 +57,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _attempt(
-    recipe: RoomRecipe, cache: Cache, listener: Listener
-) -> RoomResult | TourgenError:
+def _attempt(recipe: RoomRecipe, cache: Cache, listener: Listener) -> RoomResult | TourgenError:
     try:
         return build_room(recipe, cache, listener)
     except TourgenError as error:
@@ -72,7 +70,7 @@ def _attempt(
 
 
 def _initialise(events: SimpleQueue[Started | None]) -> None:
-    global _events  # noqa: PLW0603 - a queue reaches a pool's process only this way
+    global _events  # a queue reaches a pool's process only this way
     _events = events
 
 

@@ -16,12 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tourgen.errors import InputError
 from tourgen.geometry import Float32, PointCloud
+from tourgen.stages.mesh_arrays import components
 
 VERSION = 1
 
@@ -75,9 +74,10 @@ def _require(found: int, needed: int, when: str) -> None:
 
 
 def _isolated(points: Float32, settings: Settings) -> npt.NDArray[np.bool_]:
-    distance, index = cKDTree(points).query(points, k=settings.neighbours + 1, workers=-1)
-    own = distance[:, 1:].mean(axis=1).astype(np.float32)
-    around = np.median(own[index[:, 1:]], axis=1)
+    nearest = np.arange(2, settings.neighbours + 2)  # the first is the point itself
+    distance, index = cKDTree(points).query(points, k=nearest, workers=-1)
+    own = np.asarray(distance, np.float32).mean(axis=1)
+    around = np.median(own[index], axis=1)
     return np.asarray(own > settings.isolation_ratio * np.maximum(around, 1e-4))
 
 
@@ -86,7 +86,6 @@ def _islands(points: Float32, settings: Settings) -> npt.NDArray[np.bool_]:
     cell = np.floor(points / settings.island_gap_m).astype(np.int32)
     cells, inverse, counts = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     pairs = cKDTree(cells).query_pairs(1.8, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), [len(cells)] * 2)
-    _, cluster = connected_components(graph, directed=False)
+    cluster = components(pairs, len(cells))
     size = np.bincount(cluster, weights=counts)
     return np.asarray((size < settings.island_share * len(points))[cluster][inverse.reshape(-1)])

@@ -9,10 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from tourgen.errors import StageError
 from tourgen.geometry import Mesh
-from tourgen.stages.mesh_arrays import compact, face_areas
+from tourgen.stages.mesh_arrays import compact, components, face_adjacency, face_areas
 
 VERSION = 1
 
@@ -48,12 +49,8 @@ def hygiene(mesh: Mesh, settings: Settings) -> Mesh:
     return mesh
 
 
-def _large_enough(mesh: Mesh, least_m2: float) -> np.ndarray:
-    import trimesh
-
-    label = trimesh.graph.connected_component_labels(
-        trimesh.graph.face_adjacency(mesh.faces), node_count=len(mesh.faces)
-    )
+def _large_enough(mesh: Mesh, least_m2: float) -> npt.NDArray[np.bool_]:
+    label = components(face_adjacency(mesh.faces), len(mesh.faces))
     return np.asarray(np.bincount(label, weights=face_areas(mesh))[label] >= least_m2)
 
 

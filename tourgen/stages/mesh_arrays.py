@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from tourgen.geometry import Int32, Mesh
 
@@ -38,6 +40,12 @@ def face_adjacency(faces: Int32) -> npt.NDArray[np.int64]:
     order = np.argsort(key, kind="stable")
     same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
     return np.stack([order[same], order[same + 1]], axis=1) // 3
+
+
+def components(pairs: npt.NDArray[np.int64], count: int) -> Int32:
+    """(count,) number of the connected component that each node of a graph lies in."""
+    graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), (count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int32)
 
 
 def weld(meshes: list[Mesh]) -> Mesh:

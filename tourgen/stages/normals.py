@@ -63,12 +63,6 @@ def normals(cloud: PointCloud, stations: Float64, settings: Settings) -> Oriente
     return OrientedCloud(cloud, normal, stations)
 
 
-def spread(oriented: OrientedCloud, full: PointCloud) -> OrientedCloud:
-    """Give each point of the unthinned cloud the normal of the nearest thinned one."""
-    _, near = cKDTree(oriented.cloud.points).query(full.points, workers=-1)
-    return OrientedCloud(full, oriented.normals[near], oriented.stations)
-
-
 def _tangent_planes(points: Float32, neighbours: int) -> Float32:
     import open3d as o3d
 
@@ -102,11 +96,10 @@ def _follow(normal: Float32, points: Float32, seen: npt.NDArray[np.bool_]) -> No
     if not len(hidden) or not seen.any():
         return
     known = np.flatnonzero(seen)
-    distance, near = cKDTree(points[known]).query(points[hidden], k=min(12, len(known)), workers=-1)
-    weight = 1 / np.maximum(distance.reshape(len(hidden), -1), 1e-4)
-    votes = np.einsum(
-        "ik,ikj,ij->i", weight, normal[known[near.reshape(len(hidden), -1)]], normal[hidden]
-    )
+    nearest = np.arange(1, min(12, len(known)) + 1)
+    distance, near = cKDTree(points[known]).query(points[hidden], k=nearest, workers=-1)
+    weight = 1 / np.maximum(distance, 1e-4)
+    votes = np.einsum("ik,ikj,ij->i", weight, normal[known[near]], normal[hidden])
     normal[hidden[votes < 0]] *= -1
 
 

@@ -47,5 +47,5 @@ def spacing_at(tree: cKDTree, points: Float32) -> Float32:
     From the distance r to the fourth neighbour: a disc of radius r holds four points, so a
     point has the area pi r² / 4.
     """
-    distance, _ = tree.query(points, k=5, workers=-1)
-    return np.asarray(distance[:, 4] * np.sqrt(np.pi / 4), np.float32)
+    distance, _ = tree.query(points, k=[5], workers=-1)
+    return np.asarray(distance, np.float32).reshape(-1) * np.float32(np.sqrt(np.pi / 4))

@@ -65,4 +65,3 @@ def voxel_groups(
     key = key[order]
     starts = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
     return order, starts
-

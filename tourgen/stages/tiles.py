@@ -1,10 +1,10 @@
 """Tiles: cut the finest mesh into a tree, and simplify inside each branch.
 
 Faces are divided by a k-d tree over their centroids, down to leaves of ``leaf_faces``. A branch
-takes its children's faces, welds them and simplifies them with the branch's outer border locked
-(fast-simplification's ``preserve_border``). Every border is thus the same polyline at all levels: tiles of any
-levels meet exactly, without skirts, and nothing can poke through thin things. The price is full
-resolution along the borders of coarse tiles, a few per cent of the faces.
+takes its children's faces, welds them and simplifies them with its outer border locked. Every
+border is thus the same polyline at all levels: tiles of any levels meet exactly, without skirts,
+and nothing can poke through thin things. The price is full resolution along the borders of
+coarse tiles, a tenth of their faces.
 
 Tried and rejected: levels simplified over the whole room and then cut (cracks of several
 millimetres between levels, which skirts hide only from one side, and not at 20 mm rails).

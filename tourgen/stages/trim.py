@@ -17,12 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud, PointCloud
-from tourgen.stages.mesh_arrays import compact, face_adjacency, face_areas
+from tourgen.stages.mesh_arrays import compact, components, face_adjacency, face_areas
 from tourgen.stages.sight import depth_buffer
 
 VERSION = 1
@@ -99,8 +97,7 @@ def _patches(mesh: Mesh, at: npt.NDArray[np.int64]) -> npt.NDArray[np.int32]:
     local[at] = np.arange(len(at))
     pair = local[face_adjacency(mesh.faces)]
     pair = pair[np.all(pair >= 0, axis=1)]
-    graph = coo_matrix((np.ones(len(pair), bool), (pair[:, 0], pair[:, 1])), [len(at)] * 2)
-    return np.asarray(connected_components(graph, directed=False)[1])
+    return components(pair, len(at))
 
 
 def _seen_through(

@@ -1,0 +1,100 @@
+"""The cache keeps what it is given, whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from tourgen.cache import Cache, Cost, key_of
+
+COST = Cost(1.5, 200.0)
+
+
+def test_a_result_comes_back(tmp_path: Path) -> None:
+    cache = Cache(tmp_path)
+    cache.store("k", {"points": np.arange(5)}, COST)
+    assert np.array_equal(cache.load("k")["points"], np.arange(5))
+    assert cache.cost("k") == COST
+
+
+def test_an_absent_entry_is_none(tmp_path: Path) -> None:
+    assert Cache(tmp_path).load("k") is None
+    assert Cache(tmp_path).cost("k") is None
+
+
+def test_a_flipped_byte_counts_as_absent_and_is_dropped(tmp_path: Path) -> None:
+    cache = Cache(tmp_path)
+    cache.store("k", list(range(1000)), COST)
+    (data,) = tmp_path.rglob("result.pickle")
+    broken = bytearray(data.read_bytes())
+    broken[len(broken) // 2] ^= 1
+    data.write_bytes(broken)
+    assert cache.load("k") is None
+    assert not cache.has("k")
+
+
+def test_an_entry_cut_short_counts_as_absent(tmp_path: Path) -> None:
+    cache = Cache(tmp_path)
+    cache.store("k", list(range(1000)), COST)
+    (data,) = tmp_path.rglob("result.pickle")
+    data.write_bytes(data.read_bytes()[:100])
+    assert cache.load("k") is None
+
+
+def test_storing_twice_keeps_the_first(tmp_path: Path) -> None:
+    cache = Cache(tmp_path)
+    cache.store("k", 1, COST)
+    cache.store("k", 1, Cost(9, 9))
+    assert cache.cost("k") == COST
+
+
+def test_pruning_drops_the_longest_unused_but_never_what_is_kept(tmp_path: Path) -> None:
+    cache = Cache(tmp_path)
+    for age, key in enumerate(["newest", "middle", "oldest", "kept"]):
+        cache.store(key, bytes(1000), COST)
+        (folder,) = tmp_path.rglob(key)
+        os.utime(folder, (1e9 - age, 1e9 - age))
+    cache.prune(frozenset({"kept"}), limit_bytes=3500)
+    assert [cache.has(k) for k in ("newest", "middle", "oldest", "kept")] == [
+        True,
+        True,
+        False,
+        True,
+    ]
+
+
+def test_pruning_drops_what_a_killed_build_left(tmp_path: Path) -> None:
+    cache = Cache(tmp_path)
+    cache.store("k", 1, COST)
+    (folder,) = tmp_path.rglob("k")
+    left = folder.with_name("aside-left")
+    left.mkdir()
+    cache.prune(frozenset({"k"}))
+    assert not left.exists()
+    assert cache.has("k")
+
+
+def test_keys_follow_values_and_not_their_order() -> None:
+    assert key_of({"a": 1, "b": 2}) == key_of({"b": 2, "a": 1})
+    assert key_of({"a": 1}) != key_of({"a": 2})
+
+
+def test_a_digest_is_remembered_until_the_file_changes(tmp_path: Path) -> None:
+    cache, file = Cache(tmp_path), tmp_path / "scan.ply"
+    file.write_bytes(b"one")
+    first = cache.file_digests([file])[file]
+    stamp = file.stat().st_mtime_ns
+    file.write_bytes(b"two")
+    os.utime(file, ns=(stamp, stamp))
+    assert cache.file_digests([file])[file] == first, "size and time of change are the same"
+    os.utime(file, ns=(stamp + 10**9, stamp + 10**9))
+    assert cache.file_digests([file])[file] != first
+
+
+def test_clearing_says_what_it_freed(tmp_path: Path) -> None:
+    cache = Cache(tmp_path)
+    cache.store("k", bytes(5000), COST)
+    assert cache.clear() > 5000
+    assert not cache.has("k")

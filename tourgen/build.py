@@ -1,0 +1,150 @@
+"""Build: a tour's folder in, its published site out."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tourgen.cache import Cache
+from tourgen.errors import Faults, InputError, TourgenError
+from tourgen.geometry import UInt8, View
+from tourgen.pipeline import RoomRecipe, RoomResult, planned, tour_recipes
+from tourgen.progress import Listener
+from tourgen.report import tour_report
+from tourgen.site import BuiltRoom, write_site
+from tourgen.tour import Link, Tour, Viewpoint, check_scans
+from tourgen.workers import build_rooms, cores
+
+_POSTER_QUALITY = 82
+_STEP_INSIDE_M = 0.9
+
+
+class RoomsFailed(TourgenError):
+    """Some rooms could not be built; the site published before stands.
+
+    Args:
+        errors: One a room that failed.
+    """
+
+    def __init__(self, errors: tuple[TourgenError, ...], /) -> None:
+        Exception.__init__(self, errors)
+        self.errors = errors
+        self.message = "\n".join(error.message for error in errors)
+        self.hint = ""
+        self.exit_code = max(error.exit_code for error in errors)
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """What a build would run of one room: stages, each with the reason."""
+
+    room: str
+    stages: tuple[tuple[str, str], ...]
+
+
+def plan_tour(tour: Tour) -> tuple[Planned, ...]:
+    """What a build would do, and why."""
+    cache = Cache(tour.folder)
+    return tuple(
+        Planned(recipe.room.id, planned(recipe, cache)) for recipe in tour_recipes(tour, cache)
+    )
+
+
+def build_tour(
+    tour: Tour, out: Path, listener: Listener, *, only: Sequence[str] = (), jobs: int | None = None
+) -> dict[str, Any]:
+    """Build a tour's site.
+
+    Args:
+        tour: What tour.toml says.
+        out: The site's folder, swapped in whole.
+        listener: Told each stage that starts.
+        only: Ids of the rooms to build; the others must have been built before. Empty: all.
+        jobs: Rooms built at once; as many as there are cores if left out.
+
+    Returns:
+        The report.
+
+    Raises:
+        InputError: A scan or ``only`` cannot be used.
+        RoomsFailed: Rooms could not be built.
+    """
+    started = time.perf_counter()
+    check_scans(tour)
+    cache = Cache(tour.folder)
+    recipes = tour_recipes(tour, cache)
+    _require_built(recipes, [tour.room(room_id).id for room_id in only], cache)
+    outcomes = build_rooms(recipes, cache, min(jobs or cores(), len(recipes)), listener)
+    rooms = [outcome for outcome in outcomes if isinstance(outcome, RoomResult)]
+    if len(rooms) < len(outcomes):
+        raise RoomsFailed(tuple(each for each in outcomes if isinstance(each, TourgenError)))
+    report = tour_report(rooms, time.perf_counter() - started)
+    write_site(tour, _published(tour, {room.id: room for room in rooms}), report, out)
+    cache.prune(frozenset(key for recipe in recipes for key in recipe.keys))
+    return report
+
+
+def _require_built(recipes: Iterable[RoomRecipe], only: Sequence[str], cache: Cache) -> None:
+    faults = [
+        InputError(
+            f"room `{recipe.room.id}`: expected it built, found {len(missing)} stages missing",
+            f"build it too: `--room {recipe.room.id}`",
+        )
+        for recipe in recipes
+        if only and recipe.room.id not in only and (missing := planned(recipe, cache))
+    ]
+    if faults:
+        raise Faults(tuple(faults))
+
+
+def _published(tour: Tour, rooms: Mapping[str, RoomResult]) -> list[BuiltRoom]:
+    return [
+        BuiltRoom(
+            room.id,
+            built.summary.origin,
+            built.summary.bounds[0],
+            built.summary.bounds[1],
+            built.entry,
+            tuple(_arrival(tour, link, room.id, rooms[link.to]) for link in room.links),
+            {**built.files, "poster.webp": _webp(built.poster)},
+            built.summary.points_used,
+            built.summary.levels[-1].faces,
+        )
+        for room in tour.rooms
+        for built in [rooms[room.id]]
+    ]
+
+
+def _arrival(tour: Tour, link: Link, source: str, target: RoomResult) -> View:
+    """Where a visitor arrives: as given, else inside the door back, else at the entry."""
+    if link.arrive:
+        return _view(link.arrive, target)
+    back = next((each for each in tour.room(link.to).links if each.to == source), None)
+    if back is None:
+        return target.entry
+    door = np.array(back.at) - target.summary.origin
+    inward = target.summary.bounds.mean(axis=0) - door
+    inward[2] = 0
+    inward /= max(float(np.linalg.norm(inward)), 1e-6)
+    position = door + _STEP_INSIDE_M * inward
+    position[2] = target.entry.position[2]
+    return View(position, position + 2 * inward)
+
+
+def _view(given: Viewpoint, room: RoomResult) -> View:
+    origin = room.summary.origin
+    return View(np.array(given.position) - origin, np.array(given.look_at) - origin)
+
+
+def _webp(picture: UInt8) -> bytes:
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(picture).save(stream, "WEBP", quality=_POSTER_QUALITY, method=6)
+    return stream.getvalue()
