@@ -1,0 +1,51 @@
+/**
+ * What tests and the curious can ask of the viewer; documented here and nowhere in its interface.
+ *
+ * In the address: `?levels=root|leaves|checkerboard` forces levels of detail, where a
+ * checkerboard shows every other tile below the root whole and its neighbours by their leaves;
+ * `?background=ff00ff` colours the void, so that a hole shows. `window.tourgen` answers as below.
+ */
+
+import { levelsOf, type Levels } from "./levels.ts";
+import type { Triple } from "./tour.ts";
+
+export interface Diagnostics {
+  /** Id of the room one is in, or on the way to. */
+  readonly room: string;
+  /** The room's root tile is on screen. */
+  readonly ready: boolean;
+  /** Nothing moves, nothing is being fetched, and the last picture shows all that the view asks for. */
+  readonly idle: boolean;
+  /** The eye, metres, room frame, z up. */
+  readonly position: Triple;
+  /** Where it looks, unit length, room frame. */
+  readonly look: Triple;
+  readonly stats: {
+    readonly tiles: number;
+    readonly triangles: number;
+    readonly drawCalls: number;
+    /** Fetched for this room's tiles. */
+    readonly bytes: number;
+    /** Pictures drawn since the page was opened. */
+    readonly frames: number;
+  };
+  /** Puts the eye at a place, through walls, floor or not. */
+  teleport(position: Triple, lookAt: Triple): void;
+}
+
+declare global {
+  interface Window {
+    tourgen?: Diagnostics;
+  }
+}
+
+const SKY = "#cdd8e0";
+
+export function readQuery(search: string): { levels: Levels; background: string } {
+  const query = new URLSearchParams(search);
+  const background = query.get("background") ?? "";
+  return {
+    levels: levelsOf(query.get("levels")),
+    background: /^[0-9a-f]{6}$/i.test(background) ? `#${background}` : SKY,
+  };
+}

@@ -1,0 +1,50 @@
+/** Doors and notes: real buttons that hang over the picture where their places are. */
+
+import { Vector3, type PerspectiveCamera, type Vector2 } from "three";
+import { element } from "./dom.ts";
+import type { Triple } from "./tour.ts";
+
+export interface Spot {
+  readonly at: Triple;
+  readonly button: HTMLButtonElement;
+  /** Full up to the first distance, gone from the second on, metres. */
+  readonly fade: readonly [full: number, gone: number];
+}
+
+const HIDDEN_BELOW = 0.06;
+const EDGE_PX = 24;
+
+export class Hotspots {
+  readonly element = element("div", { class: "spots" });
+  #spots: readonly Spot[] = [];
+
+  show(spots: readonly Spot[]): void {
+    this.#spots = spots;
+    this.element.replaceChildren(...spots.map((spot) => spot.button));
+    for (const spot of spots) spot.button.classList.add("away");
+  }
+
+  /**
+   * Moves the buttons to where their places are seen.
+   *
+   * @param hidden Whether a place stands behind something.
+   */
+  place(camera: PerspectiveCamera, size: Vector2, hidden: (at: Vector3) => boolean): void {
+    const at = new Vector3();
+    for (const { at: place, button, fade } of this.#spots) {
+      at.set(...place);
+      const distance = camera.position.distanceTo(at);
+      const strength = Math.min(1, Math.max(0, (fade[1] - distance) / (fade[1] - fade[0])));
+      const seen = at.clone().project(camera);
+      const x = ((seen.x + 1) / 2) * size.x;
+      const y = ((1 - seen.y) / 2) * size.y;
+      const inside =
+        seen.z < 1 && x > EDGE_PX && x < size.x - EDGE_PX && y > EDGE_PX && y < size.y - EDGE_PX;
+      const shown = inside && strength > HIDDEN_BELOW && !hidden(at);
+      button.classList.toggle("away", !shown);
+      if (!inside) continue;
+      button.style.setProperty("--strength", strength.toFixed(2));
+      button.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+    }
+  }
+}

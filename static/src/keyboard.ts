@@ -1,0 +1,68 @@
+/** Keys that walk and turn, told by their place on the keyboard: WASD is ZQSD in France. */
+
+const MOVES: Readonly<Record<string, readonly [ahead: number, left: number, turn: number, up: number]>> = {
+  KeyW: [1, 0, 0, 0],
+  ArrowUp: [1, 0, 0, 0],
+  KeyS: [-1, 0, 0, 0],
+  ArrowDown: [-1, 0, 0, 0],
+  KeyA: [0, 1, 0, 0],
+  KeyD: [0, -1, 0, 0],
+  ArrowLeft: [0, 0, 1, 0],
+  ArrowRight: [0, 0, -1, 0],
+  KeyQ: [0, 0, 1, 0],
+  KeyE: [0, 0, -1, 0],
+  PageUp: [0, 0, 0, 1],
+  PageDown: [0, 0, 0, -1],
+};
+
+export interface Wish {
+  /** Steps ahead and to the left, turns to the left and up: -1 to 1 each. */
+  ahead: number;
+  left: number;
+  turn: number;
+  up: number;
+  fast: boolean;
+}
+
+export class Keyboard {
+  readonly #down = new Set<string>();
+  #fast = false;
+
+  /** @param wake Called when a key goes down that matters. */
+  constructor(target: Window, wake: () => void) {
+    target.addEventListener("keydown", (event) => {
+      this.#fast = event.shiftKey;
+      if (!(event.code in MOVES) || event.ctrlKey || event.altKey || event.metaKey) return;
+      if (keepsKeys(event.target)) return;
+      event.preventDefault();
+      this.#down.add(event.code);
+      wake();
+    });
+    target.addEventListener("keyup", (event) => {
+      this.#fast = event.shiftKey;
+      this.#down.delete(event.code);
+    });
+    target.addEventListener("blur", () => this.#down.clear());
+  }
+
+  get active(): boolean {
+    return this.#down.size > 0;
+  }
+
+  wish(): Wish {
+    const wish: Wish = { ahead: 0, left: 0, turn: 0, up: 0, fast: this.#fast };
+    for (const code of this.#down) {
+      const [ahead, left, turn, up] = MOVES[code] ?? [0, 0, 0, 0];
+      wish.ahead += ahead;
+      wish.left += left;
+      wish.turn += turn;
+      wish.up += up;
+    }
+    return wish;
+  }
+}
+
+/** Whether the element uses such keys itself: a choice of languages, a panel that scrolls. */
+function keepsKeys(target: EventTarget | null): boolean {
+  return target instanceof Element && target.closest("select, input, textarea, .panel") !== null;
+}

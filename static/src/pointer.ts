@@ -1,0 +1,119 @@
+/** Mouse and fingers on the picture: drag to look, click to go, two fingers to move. */
+
+const CLICK_SLOP_PX = 7;
+const CLICK_MAX_MS = 600;
+/** A two-finger drag so long asks for full speed. */
+const STICK_PX = 90;
+
+export interface PointerEvents {
+  /** Dragged by so many pixels. */
+  look(dx: number, dy: number): void;
+  /** Clicked or tapped, pixels from the upper left. */
+  click(x: number, y: number): void;
+  /** A mouse hovers there, or left. */
+  hover(x: number, y: number): void;
+  leave(): void;
+  /** Two fingers ask to move ahead and left, -1 to 1 each. */
+  stick(ahead: number, left: number): void;
+  wheel(delta: number): void;
+}
+
+interface Finger {
+  x: number;
+  y: number;
+  readonly startX: number;
+  readonly startY: number;
+  readonly since: number;
+  moved: boolean;
+}
+
+export class Pointer {
+  readonly #fingers = new Map<number, Finger>();
+  readonly #events: PointerEvents;
+  #anchor: readonly [number, number] | null = null;
+
+  constructor(canvas: HTMLElement, events: PointerEvents) {
+    this.#events = events;
+    canvas.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      canvas.setPointerCapture(event.pointerId);
+      canvas.focus({ preventScroll: true });
+      this.#press(event);
+    });
+    canvas.addEventListener("pointermove", (event) => this.#move(event));
+    canvas.addEventListener("pointerup", (event) => this.#release(event, true));
+    canvas.addEventListener("pointercancel", (event) => this.#release(event, false));
+    canvas.addEventListener("pointerleave", () => events.leave());
+    canvas.addEventListener(
+      "wheel",
+      (event) => {
+        event.preventDefault();
+        events.wheel(Math.sign(event.deltaY));
+      },
+      { passive: false },
+    );
+  }
+
+  get dragging(): boolean {
+    return this.#fingers.size > 0;
+  }
+
+  #press(event: PointerEvent): void {
+    this.#fingers.set(event.pointerId, {
+      x: event.offsetX,
+      y: event.offsetY,
+      startX: event.offsetX,
+      startY: event.offsetY,
+      since: event.timeStamp,
+      moved: this.#fingers.size > 0,
+    });
+    this.#anchor = this.#fingers.size > 1 ? this.#middle() : null;
+    for (const finger of this.#fingers.values()) finger.moved ||= this.#fingers.size > 1;
+  }
+
+  #move(event: PointerEvent): void {
+    const finger = this.#fingers.get(event.pointerId);
+    if (!finger) {
+      if (event.pointerType === "mouse") this.#events.hover(event.offsetX, event.offsetY);
+      return;
+    }
+    const dx = event.offsetX - finger.x;
+    const dy = event.offsetY - finger.y;
+    finger.x = event.offsetX;
+    finger.y = event.offsetY;
+    const far = Math.hypot(finger.x - finger.startX, finger.y - finger.startY);
+    finger.moved ||= far > CLICK_SLOP_PX;
+    if (this.#anchor) {
+      const [x, y] = this.#middle();
+      this.#events.stick(unit((this.#anchor[1] - y) / STICK_PX), unit((this.#anchor[0] - x) / STICK_PX));
+    } else if (finger.moved) {
+      this.#events.look(dx, dy);
+    }
+  }
+
+  #release(event: PointerEvent, done: boolean): void {
+    const finger = this.#fingers.get(event.pointerId);
+    if (!finger) return;
+    this.#fingers.delete(event.pointerId);
+    if (this.#anchor) {
+      this.#anchor = null;
+      this.#events.stick(0, 0);
+    }
+    const brief = event.timeStamp - finger.since < CLICK_MAX_MS;
+    if (done && brief && !finger.moved) this.#events.click(finger.x, finger.y);
+  }
+
+  #middle(): [number, number] {
+    let x = 0;
+    let y = 0;
+    for (const finger of this.#fingers.values()) {
+      x += finger.x / this.#fingers.size;
+      y += finger.y / this.#fingers.size;
+    }
+    return [x, y];
+  }
+}
+
+function unit(value: number): number {
+  return Math.min(1, Math.max(-1, value));
+}

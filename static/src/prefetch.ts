@@ -1,0 +1,45 @@
+/** Fetches the rooms next door ahead, so that a door opens at once. */
+
+import type { Room, Tour } from "./tour.ts";
+
+interface TilesetRoot {
+  readonly root: { readonly content?: { readonly uri: string } };
+}
+
+export class Prefetch {
+  readonly #site: URL;
+  readonly #tour: Tour;
+  readonly #done = new Set<string>();
+
+  constructor(site: URL, tour: Tour) {
+    this.#site = site;
+    this.#tour = tour;
+  }
+
+  /** Marks a room as fetched, and fetches its neighbours one after the other. */
+  async neighbours(room: Room): Promise<void> {
+    this.#done.add(room.id);
+    for (const { to } of room.links) {
+      const next = this.#tour.rooms.find(({ id }) => id === to);
+      if (!next || this.#done.has(next.id)) continue;
+      this.#done.add(next.id);
+      await this.#room(next);
+    }
+  }
+
+  /** Poster, tileset and root tile, into the browser's cache. A failure costs nothing. */
+  async #room(room: Room): Promise<void> {
+    try {
+      new Image().src = new URL(room.poster, this.#site).href;
+      const tileset = new URL(room.tileset, this.#site);
+      const response = await fetch(tileset, { priority: "low" });
+      const { root } = (await response.json()) as TilesetRoot;
+      if (root.content) {
+        const tile = await fetch(new URL(root.content.uri, tileset), { priority: "low" });
+        await tile.arrayBuffer();
+      }
+    } catch {
+      this.#done.delete(room.id);
+    }
+  }
+}

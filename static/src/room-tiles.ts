@@ -1,0 +1,211 @@
+/** One room's tileset on screen: streamed by what the view asks for, its root tile first. */
+
+import { TilesRenderer } from "3d-tiles-renderer/three";
+import type { Tile } from "3d-tiles-renderer/core";
+import {
+  LoadingManager,
+  Mesh,
+  MeshBasicMaterial,
+  type Group,
+  type Object3D,
+  type PerspectiveCamera,
+  type Vector2,
+} from "three";
+import { DRACOLoader } from "three/addons/loaders/DRACOLoader.js";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { Collider } from "./collider.ts";
+import { boxOf, checkerboard, type Levels } from "./levels.ts";
+
+/** Screen error in pixels above which a tile is replaced by its children. */
+const ERROR_TARGET_PX = 2;
+const MIB = 2 ** 20;
+const CACHE_BYTES = 256 * MIB;
+const CACHE_BYTES_PHONE = 128 * MIB;
+const ANISOTROPY = 8;
+
+export interface RoomEvents {
+  /** Something changed that wants an update of the tiles or a new picture. */
+  changed(): void;
+  /** Bytes of the root tile that have come, 0 to 1. */
+  progress(part: number): void;
+  /** The root tile is there: the room can be shown and walked. */
+  root(collider: Collider): void;
+  /** Nothing of the room can be shown. */
+  failed(): void;
+  /** A tile below the root is missing; its parent stands in for it. */
+  partFailed(): void;
+}
+
+/** What every room's tiles are decoded with; made once. */
+export function tileDecoder(decoderFolder: URL): LoadingManager {
+  const manager = new LoadingManager();
+  const draco = new DRACOLoader(manager);
+  draco.setDecoderPath({
+    js: new URL("draco_wasm_wrapper.js", decoderFolder).href,
+    wasm: new URL("draco_decoder.wasm", decoderFolder).href,
+  });
+  draco.preload();
+  manager.addHandler(/\.glb$/, new GLTFLoader(manager).setDRACOLoader(draco));
+  return manager;
+}
+
+export class RoomTiles {
+  readonly #tiles: TilesRenderer;
+  readonly #events: RoomEvents;
+  #stale = true;
+  #rootShown = false;
+  #bytes = 0;
+
+  constructor(
+    tileset: URL,
+    decoder: LoadingManager,
+    camera: PerspectiveCamera,
+    levels: Levels,
+    phone: boolean,
+    events: RoomEvents,
+  ) {
+    this.#events = events;
+    const tiles = new TilesRenderer(tileset.href);
+    this.#tiles = tiles;
+    tiles.manager = decoder;
+    tiles.errorTarget = levels === "view" ? ERROR_TARGET_PX : 0;
+    tiles.maxDepth = 1;
+    tiles.lruCache.maxBytesSize = phone ? CACHE_BYTES_PHONE : CACHE_BYTES;
+    tiles.lruCache.minBytesSize = tiles.lruCache.maxBytesSize * 0.75;
+    tiles.setCamera(camera);
+    tiles.registerPlugin({ fetchData: (url: string, init: RequestInit) => this.#fetch(url, init) });
+    if (levels !== "view") tiles.registerPlugin(new ForcedLevels(levels));
+    tiles.addEventListener("needs-update", () => this.#touch());
+    tiles.addEventListener("tile-visibility-change", () => events.changed());
+    tiles.addEventListener("load-model", ({ scene, tile }) => this.#loaded(scene, tile));
+    tiles.addEventListener("load-error", ({ tile }) => {
+      if (tile?.parent) events.partFailed();
+      else events.failed();
+      this.#touch();
+    });
+  }
+
+  get group(): Group {
+    return this.#tiles.group;
+  }
+
+  /** Whether tiles are still to come for the present view. */
+  get busy(): boolean {
+    const { queued, downloading, parsing } = statsOf(this.#tiles);
+    return this.#stale || !this.#rootShown || queued + downloading + parsing > 0;
+  }
+
+  /** Tiles on screen. */
+  get tileCount(): number {
+    return this.#tiles.visibleTiles.size;
+  }
+
+  /** Bytes fetched for this room. */
+  get bytes(): number {
+    return this.#bytes;
+  }
+
+  /** Brings the tiles up to the camera, whose matrices must be current. */
+  update(camera: PerspectiveCamera, size: Vector2): void {
+    this.#stale = false;
+    this.#tiles.setResolution(camera, size);
+    this.#tiles.update();
+  }
+
+  /** To be called when the camera moved. */
+  moved(): void {
+    this.#stale = true;
+  }
+
+  retry(): void {
+    this.#tiles.resetFailedTiles();
+    this.#touch();
+  }
+
+  dispose(): void {
+    this.#tiles.dispose();
+  }
+
+  #touch(): void {
+    this.#stale = true;
+    this.#events.changed();
+  }
+
+  #loaded(scene: Object3D, tile: Tile): void {
+    scene.traverse((object) => {
+      if (!(object instanceof Mesh) || !(object.material instanceof MeshBasicMaterial)) return;
+      if (object.material.map) object.material.map.anisotropy = ANISOTROPY;
+    });
+    if (tile.parent === null && !this.#rootShown) {
+      this.#rootShown = true;
+      this.#tiles.maxDepth = Infinity;
+      this.#events.root(colliderOf(scene));
+    }
+    this.#touch();
+  }
+
+  /** Counts what comes, and tells how much of the root tile is there. */
+  async #fetch(url: string, init: RequestInit): Promise<ArrayBuffer | object> {
+    const response = await fetch(url, init);
+    if (!response.ok) throw new Error(`${url}: the server answered ${response.status}`);
+    if (this.#rootShown || !response.body || !url.endsWith(".glb")) {
+      const data = await response.arrayBuffer();
+      this.#bytes += data.byteLength;
+      return url.endsWith(".json") ? (JSON.parse(new TextDecoder().decode(data)) as object) : data;
+    }
+    const expected = Number(response.headers.get("content-length") ?? 0);
+    const parts: BlobPart[] = [];
+    let got = 0;
+    const reader = response.body.getReader();
+    for (let next = await reader.read(); !next.done; next = await reader.read()) {
+      parts.push(next.value);
+      got += next.value.byteLength;
+      this.#events.progress(expected > 0 ? Math.min(1, got / expected) : 0.5);
+    }
+    this.#bytes += got;
+    return new Blob(parts).arrayBuffer();
+  }
+}
+
+/** Cuts the tree off where a test wants it to end; what is left is refined to its leaves. */
+class ForcedLevels {
+  readonly #levels: Levels;
+
+  constructor(levels: Levels) {
+    this.#levels = levels;
+  }
+
+  preprocessNode(tile: Tile, _folder: string, parent: Tile | null): void {
+    if (this.#levels === "root" && parent === null) tile.children = [];
+    if (this.#levels === "checkerboard" && parent !== null && parent.parent === null) {
+      const siblings = parent.children ?? [];
+      const coarse = checkerboard(siblings.map(boxOf));
+      if (coarse[siblings.indexOf(tile)]) tile.children = [];
+    }
+  }
+}
+
+/** All triangles below `scene`, in the frame of the room. */
+function colliderOf(scene: Object3D): Collider {
+  scene.updateMatrixWorld(true);
+  const positions: number[] = [];
+  const index: number[] = [];
+  scene.traverse((object) => {
+    if (!(object instanceof Mesh)) return;
+    const start = positions.length / 3;
+    const geometry = (object as Mesh).geometry.clone().applyMatrix4(object.matrixWorld);
+    const corners = geometry.getAttribute("position");
+    for (let i = 0; i < corners.count; i++) {
+      positions.push(corners.getX(i), corners.getY(i), corners.getZ(i));
+    }
+    const count = geometry.index ? geometry.index.count : corners.count;
+    for (let i = 0; i < count; i++) index.push(start + (geometry.index ? geometry.index.getX(i) : i));
+  });
+  return new Collider(new Float32Array(positions), new Uint32Array(index));
+}
+
+/** The renderer's counts, which its types leave out. */
+function statsOf(tiles: TilesRenderer): { queued: number; downloading: number; parsing: number } {
+  return (tiles as unknown as { stats: { queued: number; downloading: number; parsing: number } })
+    .stats;
+}

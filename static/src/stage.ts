@@ -1,0 +1,114 @@
+/** Canvas, camera and the loop that draws only when something moved. */
+
+import {
+  Color,
+  PerspectiveCamera,
+  Scene,
+  Vector2,
+  WebGLRenderer,
+  type Vector3,
+} from "three";
+import type { Look } from "./look.ts";
+
+const PIXEL_RATIO_MAX = 2;
+/** A slow machine walks no slower down to four pictures a second. */
+const STEP_MAX_S = 0.25;
+const NEAR_M = 0.04;
+const FAR_M = 500;
+/** Vertical field of view of a wide window; a tall one sees at least `ACROSS_MIN_DEG` across. */
+const UPRIGHT_DEG = 65;
+const ACROSS_MIN_DEG = 48;
+const UPRIGHT_MAX_DEG = 85;
+const ZOOM_MIN = 0.45;
+
+export class Stage {
+  readonly renderer: WebGLRenderer;
+  readonly scene = new Scene();
+  readonly camera = new PerspectiveCamera(UPRIGHT_DEG, 1, NEAR_M, FAR_M);
+  readonly size = new Vector2(1, 1);
+  readonly #frame: (dt: number) => boolean;
+  #zoom = 1;
+  #scheduled = 0;
+  #before: number | null = null;
+  #dirty = true;
+
+  /**
+   * @param canvas Where to draw.
+   * @param background CSS colour of the void.
+   * @param frame Called before each picture with seconds gone; true asks for another.
+   * Throws where WebGL 2 is missing.
+   */
+  constructor(canvas: HTMLCanvasElement, background: string, frame: (dt: number) => boolean) {
+    this.#frame = frame;
+    this.renderer = new WebGLRenderer({ canvas, antialias: true });
+    this.scene.background = new Color(background);
+    this.camera.up.set(0, 0, 1);
+    new ResizeObserver(() => this.#fit()).observe(canvas);
+    canvas.addEventListener("webglcontextrestored", () => this.draw());
+    this.#fit();
+  }
+
+  /** Whether nothing is moving and the last picture stands. */
+  get still(): boolean {
+    return this.#scheduled === 0 && !this.#dirty;
+  }
+
+  /** Radians that a pixel spans in the middle of the picture. */
+  get pixelAngle(): number {
+    return (this.camera.fov * Math.PI) / 180 / this.size.y;
+  }
+
+  /** Asks for a picture. */
+  draw(): void {
+    this.#dirty = true;
+    this.wake();
+  }
+
+  /** Asks for a step of the loop; a picture is drawn only if something is found changed. */
+  wake(): void {
+    if (this.#scheduled === 0) this.#scheduled = requestAnimationFrame((now) => this.#tick(now));
+  }
+
+  zoom(factor: number): void {
+    this.#zoom = Math.min(1, Math.max(ZOOM_MIN, this.#zoom * factor));
+    this.#fit();
+  }
+
+  aim(eye: Vector3, look: Look): void {
+    this.camera.position.copy(eye);
+    this.camera.lookAt(look.direction().add(eye));
+    this.camera.updateMatrixWorld();
+  }
+
+  #tick(now: number): void {
+    const dt = this.#before === null ? 1 / 60 : Math.min(STEP_MAX_S, (now - this.#before) / 1000);
+    this.#scheduled = 0;
+    const more = this.#frame(dt);
+    if (this.#dirty) {
+      this.#dirty = false;
+      this.renderer.render(this.scene, this.camera);
+    }
+    this.#before = more ? now : null;
+    if (more) this.wake();
+  }
+
+  #fit(): void {
+    const canvas = this.renderer.domElement;
+    const width = Math.max(1, canvas.clientWidth);
+    const height = Math.max(1, canvas.clientHeight);
+    this.size.set(width, height);
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, PIXEL_RATIO_MAX));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.fov = uprightField(width / height) * this.#zoom;
+    this.camera.updateProjectionMatrix();
+    this.draw();
+  }
+}
+
+/** Vertical field of view, degrees, for a picture of this shape. */
+export function uprightField(aspect: number): number {
+  const across = Math.tan((ACROSS_MIN_DEG * Math.PI) / 360);
+  const needed = (Math.atan(across / aspect) * 360) / Math.PI;
+  return Math.min(UPRIGHT_MAX_DEG, Math.max(UPRIGHT_DEG, needed));
+}
