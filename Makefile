@@ -36,7 +36,7 @@ system-tests:
 define install_debian
 @missing="$$($(PYTHON) -m tourgen.doctor $(NEEDED_BY))"; \
 if [ -z "$$missing" ]; then exit 0; fi; \
-line="apt-get update --quiet=2 && DEBIAN_FRONTEND=noninteractive apt-get install --quiet=2 --yes --no-install-recommends $$missing"; \
+line="apt-get update --quiet=2 && DEBIAN_FRONTEND=noninteractive apt-get install --quiet=2 --yes --no-install-recommends $$missing >/dev/null"; \
 if [ "$$(id -u)" = 0 ]; then sh -c "$$line"; \
 elif sudo --non-interactive true 2>/dev/null; then sudo sh -c "$$line"; \
 else printf 'error: this machine lacks %s\n\nhint: sudo sh -c "%s"\n' "$$missing" "$$line"; exit 1; fi
@@ -101,14 +101,14 @@ bench: demo
 lock: COMPILE = uv pip compile --no-config --quiet --upgrade --universal --python-version 3.11 \
 	--generate-hashes --no-annotate --no-header --no-emit-index-url --no-emit-find-links
 lock: $(VENV)/.packages
-	$(PYTHON) -m venv --without-pip $(VENV)-lock
-	$(PYTHON) -m pip $(PIP) --python $(VENV)-lock/bin/python install --quiet $(UV)
-	PATH=$(VENV)-lock/bin:$$PATH; \
+	$(PYTHON) -m venv --without-pip $(VENV)/lock
+	$(PYTHON) -m pip $(PIP) --python $(VENV)/lock/bin/python install --quiet $(UV)
+	PATH=$(VENV)/lock/bin:$$PATH; \
 	$(COMPILE) requirements/build.in -o requirements/build.txt && \
 	$(COMPILE) pyproject.toml -c requirements/build.txt -o requirements/run.txt && \
 	$(COMPILE) pyproject.toml --extra test -c requirements/build.txt -c requirements/run.txt \
 		-o requirements/test.txt
-	rm -rf $(VENV)-lock
+	rm -rf $(VENV)/lock
 	for folder in static tests; do \
 		(cd $$folder && rm -f package-lock.json && $(NPM) install --package-lock-only --ignore-scripts); \
 	done

@@ -1,0 +1,48 @@
+"""What a visitor gets first is small, and looks like what comes after."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from pathlib import Path
+
+from published import rooms_of, surface, tileset
+from visitor import Visit, psnr_db
+
+FIRST_VIEW_BYTES = 200_000
+FIRST_VIEW_FACES = 8_000
+FIRST_VIEW_DB = 22.0
+SCRIPT_BYTES = 250_000
+
+
+def test_the_first_view_is_small_and_full(site: Path) -> None:
+    room = rooms_of(site)["chamber1"]
+    file = site / room["tileset"]
+    _, root = tileset(file)
+    assert file.stat().st_size + root.file.stat().st_size <= FIRST_VIEW_BYTES
+    assert len(surface(root.file.read_bytes()).faces) >= FIRST_VIEW_FACES
+
+
+def test_the_first_view_looks_like_the_finest(site: Path, visit: Visit) -> None:
+    entry = rooms_of(site)["chamber1"]["entry"]
+    pictures = []
+    for levels in ("root", "leaves"):
+        here = visit()
+        here.open("rooms/chamber1/index.html", levels=levels)
+        here.teleport(entry["position"], entry["look_at"])
+        pictures.append(here.picture())
+    assert psnr_db(*pictures) >= FIRST_VIEW_DB
+
+
+def test_the_script_is_small(site: Path) -> None:
+    """All of it but the Draco decoder, as a host would send it."""
+    scripts = [file for file in (site / "viewer").glob("*.js") if "draco" not in file.name]
+    assert scripts
+    assert sum(len(gzip.compress(file.read_bytes())) for file in scripts) <= SCRIPT_BYTES
+
+
+def test_the_report_tells_the_first_view(site: Path) -> None:
+    room = rooms_of(site)["chamber1"]
+    _, root = tileset(site / room["tileset"])
+    first = (site / room["tileset"]).stat().st_size + root.file.stat().st_size
+    assert json.loads((site / "report.json").read_text())["first_view_bytes"] == first

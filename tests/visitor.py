@@ -1,0 +1,163 @@
+"""A visitor of a published tour: Chromium, and the rule that nothing may go wrong in it."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+from urllib.parse import urlencode
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+from playwright.sync_api import Browser, ConsoleMessage, Page, Request, Response
+
+Vector = npt.NDArray[np.float64]
+Picture = npt.NDArray[np.uint8]
+Visit = Callable[..., "Visitor"]
+"""Makes visitors; a test that asks for one fails when something goes wrong in its page."""
+
+CHROMIUM = (
+    "--no-sandbox",
+    "--no-first-run",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+"""Draws WebGL 2 without a graphics card, and talks to nobody on its own account."""
+
+UPRIGHT_DEG = 65.0
+"""Vertical field of view of the viewer in a wide window."""
+
+WAIT_MS = 60_000
+
+
+@dataclass
+class Visitor:
+    """One page, and what went wrong in it.
+
+    Attributes:
+        page: Playwright's page.
+        origin: The only server that it may talk to.
+        faults: Console errors, exceptions, failed requests, requests elsewhere.
+    """
+
+    page: Page
+    origin: str
+    faults: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.page.set_default_timeout(WAIT_MS)
+        self.page.on("console", self._heard)
+        self.page.on("pageerror", lambda error: self.faults.append(f"exception: {error}"))
+        self.page.on("request", self._asked)
+        self.page.on("requestfailed", self._failed)
+        self.page.on("response", self._answered)
+
+    # ---- going there
+
+    def open(self, path: str, **query: str) -> None:
+        """Open a page below the origin and wait until its room can be walked."""
+        address = f"{self.origin}/{path}" + (f"?{urlencode(query)}" if query else "")
+        self.page.goto(address)
+        self.wait("window.tourgen?.ready")
+
+    def wait(self, condition: str) -> None:
+        """Wait until a JavaScript expression is true."""
+        self.page.wait_for_function(condition)
+
+    def settle(self) -> None:
+        """Wait until everything that the view asks for is drawn."""
+        self.wait("window.tourgen.idle")
+
+    def await_room(self, room: str) -> None:
+        """Wait until a room is open."""
+        self.wait(f"window.tourgen.room === {room!r} && window.tourgen.ready")
+
+    # ---- where one is
+
+    @property
+    def room(self) -> str:
+        return str(self.page.evaluate("window.tourgen.room"))
+
+    @property
+    def position(self) -> Vector:
+        return np.array(self.page.evaluate("window.tourgen.position"), np.float64)
+
+    @property
+    def look(self) -> Vector:
+        return np.array(self.page.evaluate("window.tourgen.look"), np.float64)
+
+    @property
+    def stats(self) -> dict[str, int]:
+        return dict(self.page.evaluate("window.tourgen.stats"))
+
+    def teleport(self, position: Sequence[float], look_at: Sequence[float]) -> None:
+        """Put the eye somewhere, and wait until all is drawn."""
+        self.page.evaluate(
+            "([at, to]) => window.tourgen.teleport(at, to)", [list(position), list(look_at)]
+        )
+        self.settle()
+
+    # ---- what one sees
+
+    def picture(self) -> Picture:
+        """The canvas alone, (h, w, 3)."""
+        self.page.evaluate(
+            "document.querySelectorAll('#tour > :not(canvas)')"
+            ".forEach((each) => { each.style.opacity = '0'; each.style.transition = 'none'; })"
+        )
+        data = self.page.screenshot(type="png", animations="disabled")
+        return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+
+    # ---- what goes wrong
+
+    def _heard(self, message: ConsoleMessage) -> None:
+        if message.type == "error":
+            self.faults.append(f"console: {message.text}")
+
+    def _asked(self, request: Request) -> None:
+        if not request.url.startswith((f"{self.origin}/", "data:", f"blob:{self.origin}/")):
+            self.faults.append(f"request elsewhere: {request.url}")
+
+    def _failed(self, request: Request) -> None:
+        # What a page gives up itself, by leaving a room before all its tiles came, is no failure.
+        if request.failure != "net::ERR_ABORTED":
+            self.faults.append(f"request failed: {request.url}: {request.failure}")
+
+    def _answered(self, response: Response) -> None:
+        if response.status >= 400:
+            self.faults.append(f"answer {response.status}: {response.url}")
+
+
+def visitor(
+    browser: Browser, origin: str, *, size: tuple[int, int] = (640, 400), **context: Any
+) -> Visitor:
+    """A visitor with a browser profile of its own."""
+    view = {"width": size[0], "height": size[1]}
+    return Visitor(browser.new_context(viewport=view, **context).new_page(), origin)
+
+
+def rays(position: Vector, look_at: Vector, size: tuple[int, int]) -> npt.NDArray[np.float32]:
+    """(h, w, 6) rays through the pixels of the viewer's picture: origins and directions."""
+    width, height = size
+    ahead = (look_at - position) / np.linalg.norm(look_at - position)
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    up = np.cross(right, ahead)
+    reach = math.tan(math.radians(UPRIGHT_DEG / 2))
+    x = ((np.arange(width) + 0.5) / width * 2 - 1) * reach * width / height
+    y = (1 - (np.arange(height) + 0.5) / height * 2) * reach
+    directions = ahead + x[None, :, None] * right + y[:, None, None] * up
+    origins = np.broadcast_to(position, directions.shape)
+    return np.concatenate([origins, directions], axis=2).astype(np.float32)
+
+
+def psnr_db(one: Picture, other: Picture) -> float:
+    """Peak signal-to-noise ratio of two pictures."""
+    error = np.mean((one.astype(np.float64) - other.astype(np.float64)) ** 2)
+    return float(10 * np.log10(255**2 / error)) if error else math.inf
