@@ -11,6 +11,7 @@ z up. Paths are relative to the folder of the tour file.
 from __future__ import annotations
 
 import difflib
+import os
 import re
 import tomllib
 import types
@@ -40,6 +41,7 @@ TOUR_FILE: Final = "tour.toml"
 UNITS: Final[Mapping[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 
 _ROOM_ID = re.compile(r"(?!(con|prn|aux|nul|com\d|lpt\d)$)[a-z0-9][a-z0-9_-]{0,63}")
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 _LANGUAGE = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{2,8})*")
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -141,9 +143,10 @@ def _check_file(name: str, info: ValidationInfo) -> str:
     if info.context is None:
         return name
     path = info.context.folder / name
-    if not path.is_file():
-        beside = path.parent.iterdir() if path.parent.is_dir() else ()
-        near = difflib.get_close_matches(path.name, [entry.name for entry in beside], 1)
+    # of os.path, which holds names that no system can have for missing files
+    if not os.path.isfile(path):
+        beside = os.listdir(path.parent) if os.path.isdir(path.parent) else ()
+        near = difflib.get_close_matches(path.name, beside, 1)
         hint = f"did you mean `{Path(name).with_name(near[0]).as_posix()}`?" if near else ""
         raise _fault(f"expected a file, found none at `{name}`", hint)
     if path.stat().st_size == 0:
@@ -661,7 +664,10 @@ def _place(location: Location, data: Any) -> tuple[int, ...]:
 
 def _told(detail: ErrorDetails, data: Mapping[str, Any]) -> InputError:
     message, hint = _words(detail)
-    return InputError(f"{TOUR_FILE}: {_subject(detail['loc'], data)}: {message}", hint)
+    return InputError(
+        _CONTROL.sub("?", f"{TOUR_FILE}: {_subject(detail['loc'], data)}: {message}"),
+        _CONTROL.sub("?", hint),
+    )
 
 
 def _subject(location: Location, data: Mapping[str, Any]) -> str:
@@ -756,4 +762,4 @@ def _shown(value: object) -> str:
         text = '"' + value.replace("\n", "\\n") + '"'
     else:
         text = str(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return text if len(text) <= 60 else text[:59] + "…"

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.errors import InputError
-from tourgen.geometry import UInt8
+from tourgen.geometry import Float64, UInt8
 from tourgen.scans.scan import CHUNK_POINTS, Chunk, Source, color_range, to_8_bit
 
 _TYPES: Final = {
@@ -288,28 +288,26 @@ class _Reader:
                 ]  # fmt: skip
 
     def _ascii(self, columns: Sequence[int]) -> Iterator[list[npt.NDArray[np.generic]]]:
-        with self.path.open("rb") as binary:
-            binary.seek(self.start)
-            lines = (line for line in _text_lines(binary) if not line.isspace())
-            for size in self._sizes():
-                first = next(lines, None)
-                if first is None:
-                    return
-                rows = itertools.chain([first], itertools.islice(lines, size - 1))
-                try:
-                    table = np.loadtxt(rows, np.float64, usecols=columns, comments=None, ndmin=2)
-                except ValueError as error:
-                    reason = str(error).split(" at row")[0].split(";")[0]
-                    raise InputError(
-                        f"expected {len(self.vertex.properties)} numbers a line, found: {reason}"
-                    ) from None
-                yield list(table.T)
+        with self.path.open("rb") as file:
+            file.seek(self.start)
+            with io.TextIOWrapper(file, encoding="latin-1", newline=None) as text:
+                lines = (line for line in text if not line.isspace())
+                for size in self._sizes():
+                    rows = itertools.islice(lines, size)
+                    first = next(rows, None)
+                    if first is None:
+                        return
+                    yield list(self._parse(itertools.chain([first], rows), columns).T)
+
+    def _parse(self, rows: Iterator[str], columns: Sequence[int]) -> Float64:
+        try:
+            return np.loadtxt(rows, np.float64, usecols=columns, comments=None, ndmin=2)
+        except ValueError as error:
+            reason = str(error).split(" at row")[0].split(";")[0]
+            raise InputError(
+                f"expected {len(self.vertex.properties)} numbers a line, found: {reason}"
+            ) from None
 
     def _sizes(self) -> Iterator[int]:
         for first in range(0, self.vertex.count, CHUNK_POINTS):
             yield min(CHUNK_POINTS, self.vertex.count - first)
-
-
-def _text_lines(file: BinaryIO) -> Iterator[str]:
-    """Lines of latin-1 text, whatever ends them."""
-    return iter(io.TextIOWrapper(file, encoding="latin-1", newline=None))
