@@ -1,5 +1,4 @@
-"""Unwrap: give each face of a tile its place in a picture.
-"""
+"""Unwrap: give each face of a tile its place in a picture."""
 
 from __future__ import annotations
 
@@ -9,14 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
+from scipy.ndimage import minimum_filter1d
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
 
 from tourgen.errors import StageError
 from tourgen.geometry import Mesh, UvMesh
 from tourgen.raster import rasterize
 
 if TYPE_CHECKING:
-    from tourgen.geometry import Float32, Float64, Int32
+    from tourgen.geometry import Float64
 
 VERSION = 1
 
@@ -30,22 +31,52 @@ _LABEL_ROUNDS = 12
 _LABEL_WEIGHT = 0.5
 _MERGE_COS = np.cos(np.radians(75.0))
 _RELAX_ROUNDS = 6
-_SPLIT_ROUNDS = 6
+_RINGS_OUT = 2
+_HALVE_GAIN = 0.7
+_ANGLES = np.radians(np.arange(0.0, 90.0, 3.0))
+_UNTANGLE_ROUNDS = 4
+_TUTTE_ROUNDS = 20
+_TOUCH = 0.71  # half a texel's diagonal: any texel touched at all
 _MAX_TEXTURE = 4096
+_COARSER = 1.2
+_WIDTHS = (0.55, 0.7, 0.85, 1.0, 1.15, 1.35)
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
+    """How a tile is unwrapped.
+
+    Attributes:
+        texel_m: Edge of a texel on the surface.
+        padding_texels: Between any two charts, and between a chart and the picture's border.
+        min_chart_faces: A chart of fewer joins a neighbour, where one looks about its way.
+    """
+
     texel_m: float = 0.004
     padding_texels: int = 4
     min_chart_faces: int = 60
 
 
 def unwrap(mesh: Mesh, settings: Settings) -> UvMesh:
+    """Cut a tile into charts, flatten them and lay them into one picture.
+
+    Args:
+        mesh: A tile; faces without area and loose pieces may be among its faces.
+        settings: See there.
+
+    Returns:
+        The same faces in the same order. Charts lie at least ``padding_texels`` apart and do not
+        overlap; the picture's sides are multiples of 4 up to 4096. Where a tile's charts do not
+        fit such a picture, its texels grow, and ``texel_m`` says to what.
+
+    Raises:
+        StageError: Where the mesh has no face.
+    """
+    if not len(mesh.faces):
+        raise StageError("unwrap: expected a tile of at least 1 face, found 0")
     topology = _topology(mesh)
-    chart = _segment(mesh, topology, settings)
-    charts = _flatten_all(mesh, topology, chart, settings)
-    return _pack(mesh, charts, settings)
+    chart = _segment(topology, settings)
+    return _pack(mesh, _charts(mesh, topology, chart, settings), settings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +101,7 @@ def _topology(mesh: Mesh) -> _Topology:
     face = np.repeat(np.arange(len(mesh.faces)), 3)
     count = len(mesh.vertices)
     forward, backward = start * count + end, end * count + start
-    unique, index, uses = np.unique(forward, return_index=True, return_counts=True)
+    _, index, uses = np.unique(forward, return_index=True, return_counts=True)
     once = index[uses == 1]  # an edge run twice in one direction is no manifold: cut there
     lookup = forward[once]
     at = np.searchsorted(lookup, backward[once])
@@ -90,40 +121,51 @@ def _adjacency(pairs: Int64, weights: Float64, count: int) -> sparse.csr_matrix:
 
 
 def _unit(vectors: Float64) -> Float64:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-30)
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.maximum(lengths, 1e-30), np.float64)
 
 
-def _segment(mesh: Mesh, topology: _Topology, settings: Settings) -> Int64:
+def _sums(label: Int64, values: Float64, count: int) -> Float64:
+    """(count, k) the sum of the (n, k) values of each label."""
+    columns = [np.bincount(label, column, count) for column in values.T]
+    return np.stack(columns, axis=1).astype(np.float64)
+
+
+def _segment(topology: _Topology, settings: Settings) -> Int64:
     """(f,) chart of each face: connected faces that look about the same way."""
-    count = len(mesh.faces)
+    count = len(topology.areas)
+    normals = _smoothed(topology)
+    axes = _axes(normals, topology.areas)
+    likeness: Float64 = normals @ axes.T
+    label = likeness.argmax(1).astype(np.int64)
     adjacency = _adjacency(topology.pairs, topology.lengths, count)
-    smooth = topology.normals * topology.areas[:, None]
-    mixing = _adjacency(topology.pairs, np.ones(len(topology.pairs)), count) + sparse.identity(count)
-    mixing = sparse.diags(1 / np.asarray(mixing.sum(1)).ravel()) @ mixing
-    for _ in range(_SMOOTHING_ROUNDS):
-        smooth = mixing @ smooth
-    smooth = _unit(smooth)
-
-    axes = _axes(smooth, topology.areas)
-    likeness = smooth @ axes.T
-    label = likeness.argmax(1)
-    share = sparse.diags(1 / np.maximum(np.asarray(adjacency.sum(1)).ravel(), 1e-30)) @ adjacency
+    border = np.maximum(np.asarray(adjacency.sum(1)).ravel(), 1e-30)
+    share = sparse.diags(1 / border) @ adjacency
     for _ in range(_LABEL_ROUNDS):
         votes = share @ np.eye(len(axes))[label]
-        label = (likeness + _LABEL_WEIGHT * votes).argmax(1)
-    same = label[topology.pairs[:, 0]] == label[topology.pairs[:, 1]]
-    _, chart = connected_components(
-        _adjacency(topology.pairs[same], np.ones(same.sum()), count), directed=False
-    )
-    return _merge_small(chart, smooth, topology, settings.min_chart_faces)
+        label = (likeness + _LABEL_WEIGHT * votes).argmax(1).astype(np.int64)
+    chart = _components(topology, label)
+    return _merge_small(chart, normals, topology, settings.min_chart_faces)
+
+
+def _smoothed(topology: _Topology) -> Float64:
+    """(f, 3) normals averaged over the faces about, so that noise does not shatter charts."""
+    count = len(topology.areas)
+    mixing = _adjacency(topology.pairs, np.ones(len(topology.pairs)), count)
+    mixing = mixing + sparse.identity(count, format="csr")
+    mixing = sparse.diags(1 / np.asarray(mixing.sum(1)).ravel()) @ mixing
+    normals = topology.normals * topology.areas[:, None]
+    for _ in range(_SMOOTHING_ROUNDS):
+        normals = mixing @ normals
+    return _unit(normals)
 
 
 def _axes(normals: Float64, areas: Float64) -> Float64:
     """Directions such that nearly all area looks within 40 degrees of one of them."""
     step = max(len(normals) // 400, 1)
     candidates = normals[::step]
-    near = (candidates @ normals.T > _AXIS_COS).astype(np.float64)
-    left = np.maximum(areas, 1e-30).copy()
+    near: Float64 = (candidates @ normals.T > _AXIS_COS).astype(np.float64)
+    left = np.maximum(areas, 1e-30)
     total = left.sum()
     chosen: list[int] = []
     while len(chosen) < _MAX_AXES and left.sum() > 0.01 * total:
@@ -133,10 +175,7 @@ def _axes(normals: Float64, areas: Float64) -> Float64:
     axes = candidates[chosen]
     for _ in range(4):
         label = (normals @ axes.T).argmax(1)
-        sums = np.stack(
-            [np.bincount(label, normals[:, i] * areas, len(axes)) for i in range(3)], axis=1
-        )
-        moved = _unit(sums)
+        moved = _unit(_sums(label.astype(np.int64), normals * areas[:, None], len(axes)))
         axes = np.where(np.linalg.norm(moved, axis=1, keepdims=True) > 0.5, moved, axes)
     return axes
 
@@ -145,13 +184,9 @@ def _merge_small(chart: Int64, normals: Float64, topology: _Topology, least: int
     """Join charts of few faces to the neighbour that shares most border with them."""
     count = int(chart.max()) + 1
     faces = np.bincount(chart, minlength=count)
-    sums = np.stack(
-        [np.bincount(chart, normals[:, i] * topology.areas, count) for i in range(3)], axis=1
-    )
+    sums = _sums(chart, normals * topology.areas[:, None], count)
     one, two = chart[topology.pairs].T
-    border = _adjacency(
-        np.stack([one, two], 1)[one != two], topology.lengths[one != two], count
-    )
+    border = _adjacency(np.stack([one, two], 1)[one != two], topology.lengths[one != two], count)
     border.sum_duplicates()
     neighbours = [
         dict(zip(border.indices[a:b].tolist(), border.data[a:b].tolist(), strict=True))
@@ -182,7 +217,7 @@ def _merge_small(chart: Int64, normals: Float64, topology: _Topology, least: int
         neighbours[small] = {}
     while (target[target] != target).any():
         target = target[target]
-    return np.unique(target[chart], return_inverse=True)[1]
+    return np.unique(target[chart], return_inverse=True)[1].astype(np.int64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,15 +239,84 @@ class _Charts:
     vertex_chart: Int64
 
 
-def _flatten_all(mesh: Mesh, topology: _Topology, chart: Int64, settings: Settings) -> _Charts:
-    """Flatten; where a chart folds over itself, cut it in two and try again."""
-    for round_ in range(_SPLIT_ROUNDS + 1):
-        charts = _flatten(mesh, topology, chart)
-        bad = _folded(mesh, charts, settings.texel_m)
-        if not bad.any():
+def _charts(mesh: Mesh, topology: _Topology, chart: Int64, settings: Settings) -> _Charts:
+    """Flatten; cut what folds over itself or fills its box badly, and flatten that again.
+
+    Each round only cuts, and a face alone cannot fold, so the rounds end.
+    """
+    charts = _flatten(mesh, topology, chart)
+    round_ = 0
+    while True:
+        bad = _folded(charts, settings.texel_m)
+        if bad.any():
+            cut = _take_out(topology, charts.chart, bad, rings=_RINGS_OUT - round_)
+        else:
+            cut = _halve(charts, settings.min_chart_faces)
+        if np.array_equal(cut, charts.chart):
+            return charts
+        charts = _flatten(mesh, topology, _components(topology, cut))
+        round_ += 1
+
+
+def _components(topology: _Topology, label: Int64) -> Int64:
+    """Number the connected faces of one label."""
+    same = label[topology.pairs[:, 0]] == label[topology.pairs[:, 1]]
+    joined = _adjacency(topology.pairs[same], np.ones(int(same.sum())), len(label))
+    return connected_components(joined, directed=False)[1].astype(np.int64)
+
+
+def _take_out(topology: _Topology, chart: Int64, bad: Bool, rings: int) -> Int64:
+    """Make faces that fold charts of their own: with the rings about them, or singly below 0."""
+    next_chart = int(chart.max()) + 1
+    if rings < 0:
+        return np.where(bad, next_chart + np.arange(len(chart)), chart)
+    out = bad
+    one, two = topology.pairs[chart[topology.pairs[:, 0]] == chart[topology.pairs[:, 1]]].T
+    for _ in range(rings):
+        grown = out.copy()
+        grown[one] |= out[two]
+        grown[two] |= out[one]
+        out = grown
+    return np.where(out, chart + next_chart, chart)
+
+
+def _halve(charts: _Charts, least: int) -> Int64:
+    """Cut bent charts (an L, a V, a frame) where two boxes hold them better than one."""
+    center = charts.flat[charts.faces].mean(1)
+    chart = charts.chart.copy()
+    for which in np.flatnonzero(np.bincount(chart) >= 2 * least):
+        inside = np.flatnonzero(charts.chart == which)
+        whole = charts.flat[charts.faces[inside]]
+        side = _two_means(center[inside])
+        if not least <= side.sum() <= len(side) - least:
+            continue
+        area = _box_area(whole)
+        halves = _box_area(whole[side]) + _box_area(whole[~side])
+        if halves < _HALVE_GAIN * area:
+            chart[inside[side]] = chart.max() + 1
+    return chart
+
+
+def _two_means(points: Float64) -> Bool:
+    """(n,) which of two groups, by Lloyd's rounds from the ends of the longest axis."""
+    apart = points - points.mean(0)
+    along = apart @ np.linalg.eigh(apart.T @ apart)[1][:, -1]
+    side: Bool = along > 0
+    for _ in range(10):
+        if side.all() or not side.any():
             break
-        chart = _cut(mesh, topology, chart, bad, last=round_ >= _SPLIT_ROUNDS - 1)
-    return charts
+        one, two = points[side].mean(0), points[~side].mean(0)
+        side = ((points - one) ** 2).sum(1) < ((points - two) ** 2).sum(1)
+    return side
+
+
+def _box_area(corners: Float64) -> float:
+    """The area of the smallest box about the corners, of boxes turned by steps of 3 degrees."""
+    points = corners.reshape(-1, 2)
+    cos, sin = np.cos(_ANGLES), np.sin(_ANGLES)
+    across = points @ np.stack([cos, -sin])
+    down = points @ np.stack([sin, cos])
+    return float((np.ptp(across, axis=0) * np.ptp(down, axis=0)).min())
 
 
 def _flatten(mesh: Mesh, topology: _Topology, chart: Int64) -> _Charts:
@@ -223,15 +327,14 @@ def _flatten(mesh: Mesh, topology: _Topology, chart: Int64) -> _Charts:
     source, vertex_chart = unique % len(vertices), unique // len(vertices)
     count = int(chart.max()) + 1
 
-    weighted = topology.normals * topology.areas[:, None]
-    axis = _unit(np.stack([np.bincount(chart, weighted[:, i], count) for i in range(3)], axis=1))
+    axis = _unit(_sums(chart, topology.normals * topology.areas[:, None], count))
     axis[np.linalg.norm(axis, axis=1) < 0.5] = (0.0, 0.0, 1.0)
     least = np.eye(3)[np.abs(axis).argmin(1)]
     right = _unit(np.cross(least, axis))
     up = np.cross(axis, right)
     at = vertices[source]
     flat = np.stack([(at * right[vertex_chart]).sum(1), (at * up[vertex_chart]).sum(1)], axis=1)
-    flat = _relax(at, faces, flat, vertex_chart)
+    flat = _untangle(_relax(at, faces, flat, vertex_chart), faces)
     return _Charts(chart, source, faces, flat, vertex_chart)
 
 
@@ -262,7 +365,7 @@ def _relax(at: Float64, faces: Int64, flat: Float64, vertex_chart: Int64) -> Flo
     degree = np.asarray(off.sum(1)).ravel()
     pin = np.zeros(count)
     pin[np.unique(vertex_chart, return_index=True)[1]] = 1.0  # each chart may slide freely
-    solve = sparse.linalg.splu(
+    solve = splu(
         sparse.csc_matrix(sparse.diags(degree + pin + 1e-9) - off),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
@@ -272,9 +375,7 @@ def _relax(at: Float64, faces: Int64, flat: Float64, vertex_chart: Int64) -> Flo
     for _ in range(_RELAX_ROUNDS):
         now = flat[end] - flat[begin]
         a = (weight[..., None] * now * own_edges).sum((1, 2))
-        b = (
-            weight * (now[..., 1] * own_edges[..., 0] - now[..., 0] * own_edges[..., 1])
-        ).sum(1)
+        b = (weight * (now[..., 1] * own_edges[..., 0] - now[..., 0] * own_edges[..., 1])).sum(1)
         norm = np.maximum(np.hypot(a, b), 1e-30)
         cos, sin = (a / norm)[:, None], (b / norm)[:, None]
         turned = np.stack(
@@ -289,7 +390,7 @@ def _relax(at: Float64, faces: Int64, flat: Float64, vertex_chart: Int64) -> Flo
         for i in range(2):
             right_side[:, i] += np.bincount(end.ravel(), pull[..., i].ravel(), count)
             right_side[:, i] -= np.bincount(begin.ravel(), pull[..., i].ravel(), count)
-        flat = solve.solve(right_side)
+        flat = np.asarray(solve.solve(right_side))
     return flat
 
 
@@ -298,6 +399,241 @@ def _signed_areas(flat: Float64, faces: Int64) -> Float64:
     return (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
 
 
-def _folded(mesh: Mesh, charts: _Charts, texel_m: float) -> Bool:
-    """(f,) faces that lie on another face of their chart, or upside down."""
-    return _signed_areas(charts.flat, charts.faces) < 0
+def _untangle(flat: Float64, faces: Int64) -> Float64:
+    """Draw the vertices about upside-down faces toward the middle of their neighbours.
+
+    Tutte: How to draw a graph, 1963, on small patches; the border of a chart stays.
+    """
+    count = len(flat)
+    begin, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    edges = sparse.coo_matrix((np.ones(len(begin)), (begin, end)), shape=(count, count)).tocsr()
+    lone = (edges - edges.T).tocoo()
+    inner = np.ones(count, bool)
+    inner[lone.row[lone.data != 0]] = False
+    both = edges + edges.T
+    degree = np.maximum(np.asarray(both.sum(1)).ravel(), 1.0)
+    mean = sparse.csr_matrix(sparse.diags(1 / degree) @ both)
+    for ring in range(1, _UNTANGLE_ROUNDS + 1):
+        upside_down = _signed_areas(flat, faces) <= 0
+        upside_down &= inner[faces].any(1)
+        if not upside_down.any():
+            break
+        near = np.zeros(count)
+        near[faces[upside_down]] = 1.0
+        for _ in range(ring - 1):
+            near = near + np.asarray(both @ near)
+        moving = np.flatnonzero((near > 0) & inner)
+        rows = mean[moving]
+        for _ in range(_TUTTE_ROUNDS):
+            flat = flat.copy()
+            flat[moving] = np.asarray(rows @ flat)
+    return flat
+
+
+def _folded(charts: _Charts, texel_m: float) -> Bool:
+    """(f,) faces that lie on another face of their chart, or upside down.
+
+    Charts are rasterised apart from one another, at half a texel or a third of an edge.
+    """
+    areas = _signed_areas(charts.flat, charts.faces)
+    bad = areas < 0
+    step = max(texel_m, float(np.sqrt(2 * np.abs(areas).mean())) / 3)
+    count = int(charts.chart.max()) + 1
+    low, high = _boxes(charts.flat, charts.vertex_chart, count)
+    heights = np.ceil((high - low)[:, 1] / step).astype(np.int64) + 2
+    tops = np.cumsum(heights) - heights
+    at = (charts.flat - low[charts.vertex_chart]) / step + 1
+    at[:, 1] += tops[charts.vertex_chart]
+    width = int(np.ceil((high - low)[:, 0].max() / step)) + 3
+    hits = rasterize(at[charts.faces], width, int(heights.sum()))
+    # A centre on a common edge belongs to both of its faces, and is no overlap.
+    deep = hits.barycentric.min(1) > 1e-3
+    key = hits.row[deep].astype(np.int64) * width + hits.column[deep]
+    order = np.argsort(key, kind="stable")
+    twice = np.flatnonzero(np.diff(key[order]) == 0)
+    faces = hits.face[deep][order]
+    bad[faces[twice]] = True
+    bad[faces[twice + 1]] = True
+    return bad
+
+
+def _boxes(flat: Float64, owner: Int64, count: int) -> tuple[Float64, Float64]:
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, owner, flat)
+    np.maximum.at(high, owner, flat)
+    return low, high
+
+
+@dataclass(frozen=True, slots=True)
+class _Shape:
+    """A chart's outline as a stack of columns, in one of four turns.
+
+    Attributes:
+        turn: Quarter turns.
+        top: (w,) first row of each column.
+        bottom: (w,) row after the last.
+    """
+
+    turn: int
+    top: Int64
+    bottom: Int64
+
+
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """Where each chart goes: turned, then shifted by whole texels."""
+
+    width: int
+    height: int
+    turn: Int64  # (c,)
+    shift: Int64  # (c, 2) column, row
+
+
+def _pack(mesh: Mesh, charts: _Charts, settings: Settings) -> UvMesh:
+    """Lay the charts into the smallest of several widths of picture."""
+    texel_m = settings.texel_m
+    flat = _upright(charts)
+    count = int(charts.chart.max()) + 1
+    low, high = _boxes(flat, charts.vertex_chart, count)
+    while True:
+        extent = np.ceil((high - low) / texel_m).astype(np.int64) + 2
+        at = (flat - low[charts.vertex_chart]) / texel_m + 1
+        shapes = _shapes(at, charts, extent)
+        layout = _best_layout(shapes, settings.padding_texels)
+        if layout is not None:
+            break
+        texel_m *= _COARSER
+    quarter = layout.turn[charts.vertex_chart]
+    size = extent[charts.vertex_chart]
+    placed = _quarter_turns(at, size, quarter) + layout.shift[charts.vertex_chart]
+    uv = placed / (layout.width, layout.height)
+    return UvMesh(
+        Mesh(mesh.origin, mesh.vertices[charts.source], charts.faces.astype(np.int32)),
+        np.clip(uv, 0, 1).astype(np.float32),
+        charts.chart.astype(np.int32),
+        (layout.width, layout.height),
+        texel_m,
+    )
+
+
+def _quarter_turns(at: Float64, size: Int64, turn: Int64) -> Float64:
+    """Turn points of boxes of ``size`` about, so that the turned box begins at 0 again."""
+    x, y = at.T
+    width, height = size.T
+    return np.stack(
+        [
+            np.choose(turn, [x, height - y, width - x, y]),
+            np.choose(turn, [y, x, height - y, width - x]),
+        ],
+        axis=1,
+    )
+
+
+def _shapes(at: Float64, charts: _Charts, extent: Int64) -> list[list[_Shape]]:
+    """For each chart its outline in four turns: every texel that it touches."""
+    first_row = np.cumsum(extent[:, 1]) - extent[:, 1]
+    apart = at.copy()
+    apart[:, 1] += first_row[charts.vertex_chart]
+    hits = rasterize(
+        apart[charts.faces], int(extent[:, 0].max()), int(extent[:, 1].sum()), reach=_TOUCH
+    )
+    owner = charts.chart[hits.face]
+    order = np.argsort(owner, kind="stable")
+    row = (hits.row - first_row[owner])[order]
+    column = hits.column[order].astype(np.int64)
+    ends = np.cumsum(np.bincount(owner, minlength=len(extent)))
+    shapes = []
+    for which, (width, height) in enumerate(extent):
+        part = slice(ends[which - 1] if which else 0, ends[which])
+        # A neighbour's margin may reach in, where two charts were stacked: its own rows only.
+        x, y = column[part], np.clip(row[part], 0, height - 1)
+        left, right = _columns(x, y, int(width))
+        up, down = _columns(y, x, int(height))
+        shapes.append(
+            [
+                _Shape(0, left, right),
+                _Shape(1, up[::-1], down[::-1]),
+                _Shape(2, height - right[::-1], height - left[::-1]),
+                _Shape(3, width - down, width - up),
+            ]
+        )
+    return shapes
+
+
+def _columns(x: Int64, y: Int64, width: int) -> tuple[Int64, Int64]:
+    """First row of each column and the row after its last; an empty one takes a neighbour's."""
+    top, bottom = np.full(width, np.iinfo(np.int64).max), np.full(width, -1)
+    np.minimum.at(top, x, y)
+    np.maximum.at(bottom, x, y + 1)
+    filled = np.flatnonzero(bottom >= 0)
+    nearest = filled[np.searchsorted((filled[1:] + filled[:-1]) // 2, np.arange(width))]
+    return top[nearest], bottom[nearest]
+
+
+def _best_layout(shapes: list[list[_Shape]], padding: int) -> _Layout | None:
+    """The smallest picture, or None where none stays within the largest texture."""
+    texels = sum(int((chart[0].bottom - chart[0].top + padding).sum()) for chart in shapes)
+    lengths = np.array([[len(shape.top) for shape in chart[:2]] for chart in shapes]) + 2 * padding
+    order = np.argsort(-lengths.max(1), kind="stable")
+    side = float(np.sqrt(texels))
+    widths = {int(side * factor) for factor in _WIDTHS} | {int(lengths.max())}
+    least = int(lengths.min(1).max())
+    layouts = [
+        _lay(shapes, order, -(-max(width, least) // 4) * 4, padding)
+        for width in sorted({max(width, least) for width in widths})
+    ]
+    fitting = [one for one in layouts if max(one.width, one.height) <= _MAX_TEXTURE]
+    return min(fitting, key=lambda one: one.width * one.height, default=None)
+
+
+def _lay(shapes: list[list[_Shape]], order: Int64, width: int, padding: int) -> _Layout:
+    """Drop the charts, longest first, each where and how turned its lowest row comes highest up.
+
+    Lévy, Petitjean, Ray, Maillot: Least squares conformal maps for automatic texture atlas
+    generation, 2002, section 4.
+    """
+    skyline = np.full(width, padding, np.int64)
+    turn = np.zeros(len(shapes), np.int64)
+    shift = np.zeros((len(shapes), 2), np.int64)
+    used = 0
+    for which in order:
+        best: tuple[tuple[int, int], _Shape, int, int] | None = None
+        for shape in shapes[which]:
+            if len(shape.top) + 2 * padding > width:
+                continue
+            reach = minimum_filter1d(np.pad(shape.top, padding, mode="edge"), 2 * padding + 1)
+            windows = np.lib.stride_tricks.sliding_window_view(skyline, len(reach))
+            rows = (windows - reach).max(1)
+            column = int(rows.argmin())
+            row = int(rows[column])
+            wasted = int((row + reach - windows[column]).sum())
+            key = (row + int(shape.bottom.max()), wasted)
+            if best is None or key < best[0]:
+                best = (key, shape, column + padding, row)
+        assert best is not None
+        _, shape, column, row = best
+        span = slice(column, column + len(shape.top))
+        skyline[span] = np.maximum(skyline[span], row + shape.bottom + padding)
+        turn[which] = shape.turn
+        shift[which] = (column, row)
+        used = max(used, column + len(shape.top) + padding)
+    height = int(skyline.max())
+    return _Layout(-(-used // 4) * 4, -(-height // 4) * 4, turn, shift)
+
+
+def _upright(charts: _Charts) -> Float64:
+    """Turn each chart so that the box about it is smallest."""
+    count = int(charts.chart.max()) + 1
+    best_area = np.full(count, np.inf)
+    best = np.zeros(count)
+    for angle in _ANGLES:
+        low, high = _boxes(_turn(charts.flat, angle), charts.vertex_chart, count)
+        area = (high - low).prod(1)
+        better = area < best_area * (1 - 1e-6)
+        best_area[better], best[better] = area[better], angle
+    return _turn(charts.flat, best[charts.vertex_chart])
+
+
+def _turn(flat: Float64, angle: float | Float64) -> Float64:
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.stack([cos * flat[:, 0] - sin * flat[:, 1], sin * flat[:, 0] + cos * flat[:, 1]], 1)

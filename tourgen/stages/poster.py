@@ -1,0 +1,173 @@
+"""Poster: what a visitor sees on entering, rendered by ray casting, without GPU or browser.
+
+Rays through Embree (Open3D's RaycastingScene) at twice the size each way, the pictures of the
+tiles read with bilinear blending, four rays averaged a pixel. Faces seen from behind are looked
+through, as the viewer does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tourgen.errors import StageError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tourgen.geometry import Float32, TexturedMesh, UInt8, View
+
+VERSION = 1
+
+_SAMPLES = 2  # rays a pixel along each axis
+_BEHIND = 4  # faces seen from behind that a ray passes at most
+_PAST_M = 1e-3
+_ROWS_AT_ONCE = 128
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The picture.
+
+    Attributes:
+        width: Pixels.
+        height: Pixels.
+        field_of_view_deg: From the bottom to the top of the picture.
+        sky: sRGB at the top, where no surface is.
+        ground: sRGB at the bottom, where no surface is.
+    """
+
+    width: int = 1600
+    height: int = 900
+    field_of_view_deg: float = 65.0
+    sky: tuple[int, int, int] = (38, 44, 54)
+    ground: tuple[int, int, int] = (14, 16, 20)
+
+
+def poster(tiles: Sequence[TexturedMesh], view: View, settings: Settings) -> UInt8:
+    """Render the room from one view.
+
+    Args:
+        tiles: Those to be seen, commonly the leaves of the tile tree.
+        view: The camera; up is z, or y where the camera looks straight up or down.
+        settings: See there.
+
+    Returns:
+        (height, width, 3) uint8, sRGB.
+
+    Raises:
+        StageError: Where there is no tile.
+    """
+    if not tiles:
+        raise StageError("poster: expected at least 1 tile, found 0")
+    scene = _Scene(tiles)
+    directions = _directions(view, settings)
+    eye = view.position.astype(np.float32)
+    picture = np.empty((settings.height, settings.width, 3), np.float32)
+    for row in range(0, settings.height, _ROWS_AT_ONCE):
+        rows = slice(row, row + _ROWS_AT_ONCE)
+        fine = directions[row * _SAMPLES : (row + _ROWS_AT_ONCE) * _SAMPLES]
+        backdrop = _backdrop(len(fine), row * _SAMPLES, settings)
+        colors = scene.look(eye, fine.reshape(-1, 3), backdrop.reshape(-1, 3))
+        shape = (len(fine) // _SAMPLES, _SAMPLES, settings.width, _SAMPLES, 3)
+        picture[rows] = colors.reshape(shape).mean((1, 3))
+    return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+
+
+def _directions(view: View, settings: Settings) -> Float32:
+    """(h, w, 3) of the fine picture, from the eye, not of unit length."""
+    forward = view.look_at - view.position
+    forward = forward / np.linalg.norm(forward)
+    up = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.999 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    height, width = settings.height * _SAMPLES, settings.width * _SAMPLES
+    half = np.tan(np.radians(settings.field_of_view_deg) / 2)
+    across = ((np.arange(width) + 0.5) / width * 2 - 1) * half * width / height
+    down = (1 - (np.arange(height) + 0.5) / height * 2) * half
+    directions = forward + across[None, :, None] * right + down[:, None, None] * up
+    return np.asarray(directions, np.float32)
+
+
+def _backdrop(rows: int, first: int, settings: Settings) -> Float32:
+    """(rows, w, 3): from sky to ground."""
+    down = (first + np.arange(rows) + 0.5) / (settings.height * _SAMPLES)
+    color = (1 - down[:, None]) * np.array(settings.sky) + down[:, None] * np.array(settings.ground)
+    wide = np.broadcast_to(color[:, None], (rows, settings.width * _SAMPLES, 3))
+    return wide.astype(np.float32)
+
+
+class _Scene:
+    """Tiles that rays can be cast at."""
+
+    def __init__(self, tiles: Sequence[TexturedMesh]) -> None:
+        import open3d as o3d
+
+        self._tensor = o3d.core.Tensor
+        self._scene = o3d.t.geometry.RaycastingScene()
+        self._tiles: dict[int, TexturedMesh] = {}
+        for tile in tiles:
+            mesh = tile.uv_mesh.mesh
+            key = self._scene.add_triangles(
+                o3d.core.Tensor(np.ascontiguousarray(mesh.vertices)),
+                o3d.core.Tensor(mesh.faces.astype(np.uint32)),
+            )
+            self._tiles[int(key)] = tile
+
+    def look(self, eye: Float32, directions: Float32, colors: Float32) -> Float32:
+        """(n, 3) what each ray sees; ``colors`` where it meets nothing."""
+        colors = colors.copy()
+        start = np.broadcast_to(eye, directions.shape).copy()
+        going = np.arange(len(directions))
+        for _ in range(_BEHIND + 1):
+            rays = np.concatenate([start[going], directions[going]], axis=1)
+            hit = self._cast(rays)
+            met = np.isfinite(hit["t_hit"])
+            front = met & (np.einsum("nx,nx->n", hit["primitive_normals"], directions[going]) < 0)
+            self._paint(colors, going, front, hit)
+            behind = met & ~front
+            onward = hit["t_hit"][behind] * (1 + 1e-5)
+            going = going[behind]
+            if not len(going):
+                break
+            length = np.linalg.norm(directions[going], axis=1)
+            start[going] += directions[going] * (onward + _PAST_M / length)[:, None]
+        return colors
+
+    def _cast(self, rays: Float32) -> dict[str, npt.NDArray[Any]]:
+        answer = self._scene.cast_rays(self._tensor(np.ascontiguousarray(rays, np.float32)))
+        return {name: value.numpy() for name, value in answer.items()}
+
+    def _paint(
+        self,
+        colors: Float32,
+        going: npt.NDArray[np.int64],
+        front: npt.NDArray[np.bool_],
+        hit: dict[str, npt.NDArray[Any]],
+    ) -> None:
+        geometry = hit["geometry_ids"]
+        for key in np.unique(geometry[front]):
+            which = np.flatnonzero(front & (geometry == key))
+            tile = self._tiles[int(key)]
+            corner = tile.uv_mesh.uv[tile.uv_mesh.mesh.faces[hit["primitive_ids"][which]]]
+            u, v = hit["primitive_uvs"][which].T[..., None]
+            uv = corner[:, 0] * (1 - u - v) + corner[:, 1] * u + corner[:, 2] * v
+            colors[going[which]] = _bilinear(tile.texture, uv)
+
+
+def _bilinear(texture: UInt8, uv: Float32) -> Float32:
+    """(n, 3) the picture at texture coordinates."""
+    height, width = texture.shape[:2]
+    at = uv * (width, height) - 0.5
+    low = np.floor(at).astype(np.int64)
+    part = (at - low).astype(np.float32)
+    x = np.clip(np.stack([low[:, 0], low[:, 0] + 1]), 0, width - 1)
+    y = np.clip(np.stack([low[:, 1], low[:, 1] + 1]), 0, height - 1)
+    across, down = part[:, :1], part[:, 1:]
+    above = texture[y[0], x[0]] * (1 - across) + texture[y[0], x[1]] * across
+    below = texture[y[1], x[0]] * (1 - across) + texture[y[1], x[1]] * across
+    return np.asarray(above * (1 - down) + below * down, np.float32)
