@@ -85,14 +85,13 @@ def read_room(
     for chunk in _numbered(scans):
         if origin is None and len(chunk.points):
             origin = _origin(chunk.points)
-        kept = _inside(chunk.points, keep, remove)
-        part = slice(used, used + int(kept.sum()))
-        if origin is not None:
-            points[part] = chunk.points[kept] - origin
-        colors[part] = GREY if chunk.colors is None else chunk.colors[kept]
-        station[part] = chunk.station[kept]
+        inside = _cropped(chunk, keep, remove)
+        part = slice(used, used + len(inside.points))
+        points[part] = inside.points if origin is None else inside.points - origin
+        colors[part] = GREY if inside.colors is None else inside.colors
+        station[part] = inside.station
         invalid += chunk.dropped
-        cropped += len(kept) - (part.stop - part.start)
+        cropped += len(chunk.points) - len(inside.points)
         used = part.stop
     facts = ReadFacts(
         points_read=used + invalid + cropped,
@@ -125,18 +124,24 @@ def _origin(points: Float64) -> Float64:
     return np.floor(middle) if np.abs(middle).max() > NEAR_M else np.zeros(3)
 
 
-def _inside(points: Float64, keep: Box | None, remove: Sequence[Box]) -> npt.NDArray[np.bool_]:
-    inside = np.ones(len(points), np.bool_)
+def _cropped(chunk: Chunk, keep: Box | None, remove: Sequence[Box]) -> Chunk:
+    if keep is None and not remove:
+        return chunk
+    inside = np.ones(len(chunk.points), np.bool_)
     if keep is not None:
-        inside &= _within(points, keep)
+        inside &= _within(chunk.points, keep)
     for box in remove:
-        inside &= ~_within(points, box)
-    return inside
+        inside &= ~_within(chunk.points, box)
+    colors = None if chunk.colors is None else chunk.colors[inside]
+    return Chunk(chunk.points[inside], colors, chunk.station[inside])
 
 
 def _within(points: Float64, box: Box) -> npt.NDArray[np.bool_]:
-    inside = (points >= np.array(box.min)) & (points <= np.array(box.max))
-    return np.asarray(inside.all(axis=1))
+    within = np.ones(len(points), np.bool_)
+    for axis in range(3):  # by columns: reductions over rows of three are slow
+        column = points[:, axis]
+        within &= (column >= box.min[axis]) & (column <= box.max[axis])
+    return within
 
 
 def _too_few(scans: Sequence[Scan], used: int, needed: int, facts: ReadFacts) -> InputError:
