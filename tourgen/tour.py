@@ -320,15 +320,16 @@ class Surface(_Table):
         default=None,
         ge=1,
         le=500,
-        description="The finest detail that the surface shall show. Left out: derived from the "
-        "spacing of the scan's points.",
+        description="The finest detail that the surface shall show. Left out: the spacing of the "
+        "scan's points in the middle, at least 4.",
     )
     depth: Whole | None = Field(
         default=None,
         ge=5,
         le=12,
-        description="The octree's depth at most; a step doubles the detail, and memory and time "
-        "fourfold. Left out: derived from the room's size and `detail_mm`.",
+        description="The octree's depth, whatever `detail_mm` says; a step halves its cells and "
+        "takes four times the memory and time. Left out: such that its cells are as wide as "
+        "`detail_mm`.",
     )
 
 
@@ -602,7 +603,7 @@ def check_scans(tour: Tour) -> tuple[str, ...]:
             try:
                 scans.append(_open(room, reference, tour.folder))
             except InputError as fault:
-                faults.append(fault)
+                faults.append(InputError(f"room `{room.id}`: {fault.message}", fault.hint))
         warnings += (f"room `{room.id}`: {each}" for scan in scans for each in scan.warnings)
         found = sum(scan.point_count for scan in scans)
         if len(scans) == len(room.scans) and found < room.clean.min_points:
@@ -620,17 +621,14 @@ def check_scans(tour: Tour) -> tuple[str, ...]:
 
 
 def _open(room: Room, scan: ScanRef, folder: Path) -> Scan:
-    try:
-        return open_scan(
-            folder / scan.file,
-            room.unit_m,
-            room.up,
-            name=scan.file,
-            pose=scan.pose,
-            station=scan.station,
-        )
-    except InputError as error:
-        raise InputError(f"room `{room.id}`: {error.message}", error.hint) from None
+    return open_scan(
+        folder / scan.file,
+        room.unit_m,
+        room.up,
+        name=scan.file,
+        pose=scan.pose,
+        station=scan.station,
+    )
 
 
 # ------------------------------------------------------------------ faults
