@@ -16,7 +16,8 @@ import re
 import tomllib
 import types
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar, get_args
@@ -40,6 +41,7 @@ from tourgen.scans import Scan, open_scan
 TOUR_FILE: Final = "tour.toml"
 UNITS: Final[Mapping[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 
+_READING_KEYS = {"id", "scans", "unit", "up", "clean"}
 _ROOM_ID = re.compile(r"(?!(con|prn|aux|nul|com\d|lpt\d)$)[a-z0-9][a-z0-9_-]{0,63}")
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 _LANGUAGE = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{2,8})*")
@@ -498,11 +500,45 @@ def load_tour(folder: Path) -> Tour:
         Faults: All that is wrong, in the order of the file.
     """
     data = _parse(folder / TOUR_FILE)
-    context = _context(folder, data)
     try:
-        file = _File.model_validate(data, context=context)
+        file = _File.model_validate(data, context=_context(folder, data))
     except ValidationError as error:
         raise Faults(_faults(error, data)) from None
+    return _tour(folder, file)
+
+
+def check_tour(folder: Path) -> tuple[Tour, tuple[str, ...]]:
+    """Read `folder`/tour.toml and the headers of all scans that it names rightly.
+
+    Returns:
+        The tour, and what the publisher should know although a build will succeed.
+
+    Raises:
+        Faults: All that is wrong: with tour.toml, in the order of the file, then with the scans.
+    """
+    data = _parse(folder / TOUR_FILE)
+    try:
+        file = _File.model_validate(data, context=_context(folder, data))
+    except ValidationError as error:
+        faults = _faults(error, data)
+        scan_faults, _ = _check_headers(_readable_rooms(folder, data), folder)
+        raise Faults((*faults, *scan_faults)) from None
+    tour = _tour(folder, file)
+    return tour, check_scans(tour)
+
+
+def _readable_rooms(folder: Path, data: Mapping[str, Any]) -> Iterator[Room]:
+    """Of a tour file at fault, the rooms whose scans can be checked all the same."""
+    tables = data.get("room")
+    for table in tables if isinstance(tables, list) else ():
+        if isinstance(table, dict):
+            wanted = {key: table[key] for key in table.keys() & _READING_KEYS}
+            with suppress(ValidationError):
+                yield Room.model_validate(wanted, context=_context(folder, data))
+
+
+def _tour(folder: Path, file: _File) -> Tour:
+    """The tour, its texts filled in."""
     languages = file.tour.languages
     titles = {room.id: room.title or dict.fromkeys(languages, room.id) for room in file.room}
     rooms = tuple(
@@ -595,13 +631,23 @@ def check_scans(tour: Tour) -> tuple[str, ...]:
     Raises:
         Faults: Every scan that cannot be read, every room of too few points.
     """
+    faults, warnings = _check_headers(tour.rooms, tour.folder)
+    if faults:
+        raise Faults(faults)
+    return warnings
+
+
+def _check_headers(
+    rooms: Iterable[Room], folder: Path
+) -> tuple[tuple[InputError, ...], tuple[str, ...]]:
+    """Faults and warnings of the scans of these rooms."""
     faults: list[InputError] = []
     warnings: list[str] = []
-    for room in tour.rooms:
+    for room in rooms:
         scans: list[Scan] = []
         for reference in room.scans:
             try:
-                scans.append(_open(room, reference, tour.folder))
+                scans.append(_open(room, reference, folder))
             except InputError as fault:
                 faults.append(InputError(f"room `{room.id}`: {fault.message}", fault.hint))
         warnings += (f"room `{room.id}`: {each}" for scan in scans for each in scan.warnings)
@@ -615,9 +661,7 @@ def check_scans(tour: Tour) -> tuple[str, ...]:
                     "check the export, or lower `clean.min_points`",
                 )
             )
-    if faults:
-        raise Faults(tuple(faults))
-    return tuple(warnings)
+    return tuple(faults), tuple(warnings)
 
 
 def _open(room: Room, scan: ScanRef, folder: Path) -> Scan:
