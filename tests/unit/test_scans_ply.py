@@ -268,10 +268,23 @@ def test_truncated_faces_before_the_points(tmp_path):
         (ply_header("ascii", 1, XYZ, extra="property half nx"), "found `property half nx`"),
         (ply_header("ascii", 1, XYZ, extra="element vertex -1"), "found `element vertex -1`"),
         (ply_header("ascii", 1, XYZ, extra="property list uchar int k"), "found a list"),
-        (ply_header("ascii", 2, XYZ) + b"1 2 3\n4 5 six\n", "expected 3 numbers a line"),
-        (ply_header("ascii", 2, XYZ) + b"1 2 3\n4 5 \n6 7 8\n", "expected 3 numbers a line"),
-        (ply_header("ascii", 1, XYZ) + b"1,5 2,5 3,5\n", "expected 3 numbers a line"),
-        (ply_header("ascii", 1, XYZ) + b"\0\1\2\3\4\5\6\n", "expected 3 numbers a line"),
+        (
+            ply_header("ascii", 3, XYZ) + b"1 2 3\n4 5 six\n7 8 9\n",
+            "expected 3 numbers for point 2, found `4 5 six`",
+        ),
+        (
+            ply_header("ascii", 3, XYZ) + b"1 2 3\n\n4 5 \n6 7 8\n",
+            "expected 3 numbers for point 2, found `4 5`",
+        ),
+        (
+            ply_header("ascii", 2, XYZ) + b"1,5 2,5 3,5\n1,5 2,5 3,5\n",
+            "expected 3 numbers for point 1, found `1,5 2,5 3,5`",
+        ),
+        (
+            ply_header("ascii", 2, XYZ) + b"\0\1\2\3\4\5\6\n\0\0\0\n",
+            "expected 3 numbers for point 1, found `???????`",
+        ),
+        (ply_header("ascii", 3, XYZ) + b"1.5 2.5 3.5\n4 5 6\n7 8", "expected 3 points, found 2"),
     ],
 )
 def test_what_is_no_ply_is_told_in_one_line(tmp_path, text, said):

@@ -13,7 +13,7 @@ from __future__ import annotations
 import io
 import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Final
@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.errors import InputError
-from tourgen.geometry import Float64, UInt8
+from tourgen.geometry import UInt8
 from tourgen.scans.scan import CHUNK_POINTS, Chunk, Source, color_range, to_8_bit
 
 _TYPES: Final = {
@@ -180,10 +180,7 @@ def _check_length(size: int, order: str, vertex: _Element) -> None:
         holds = (size + 1) // (2 * len(vertex.properties))  # a digit and a space each
         found = f"room for {holds}"
     if holds < vertex.count:
-        raise InputError(
-            f"expected {vertex.count} points, found {found}",
-            "the file is truncated: copy or export it again",
-        )
+        raise _truncated(vertex.count, found)
 
 
 def _skip(file: BinaryIO, header: _Header, elements: Sequence[_Element]) -> int:
@@ -269,10 +266,7 @@ class _Reader:
             count += len(table[0])
             yield table
         if count < self.vertex.count:
-            raise InputError(
-                f"expected {self.vertex.count} points, found {count}",
-                "the file is truncated: copy or export it again",
-            )
+            raise _truncated(self.vertex.count, str(count))
 
     def _binary(self, columns: Sequence[int]) -> Iterator[list[npt.NDArray[np.generic]]]:
         record = self.vertex.record(self.order)
@@ -291,23 +285,58 @@ class _Reader:
         with self.path.open("rb") as file:
             file.seek(self.start)
             with io.TextIOWrapper(file, encoding="latin-1", newline=None) as text:
-                lines = (line for line in text if not line.isspace())
+                lines = _Lines(text)
                 for size in self._sizes():
                     rows = itertools.islice(lines, size)
                     first = next(rows, None)
                     if first is None:
                         return
-                    yield list(self._parse(itertools.chain([first], rows), columns).T)
+                    chunk = itertools.chain([first], rows)
+                    try:
+                        table = np.loadtxt(chunk, usecols=columns, comments=None, ndmin=2)
+                    except ValueError:
+                        raise self._unreadable(lines) from None
+                    yield list(table.T)
 
-    def _parse(self, rows: Iterator[str], columns: Sequence[int]) -> Float64:
-        try:
-            return np.loadtxt(rows, np.float64, usecols=columns, comments=None, ndmin=2)
-        except ValueError as error:
-            reason = str(error).split(" at row")[0].split(";")[0]
-            raise InputError(
-                f"expected {len(self.vertex.properties)} numbers a line, found: {reason}"
-            ) from None
+    def _unreadable(self, lines: _Lines) -> InputError:
+        """What is to be said of the line that was read last."""
+        number, line = lines.number, lines.last
+        if next(lines, None) is None:
+            return _truncated(self.vertex.count, str(number - 1))
+        shown = "".join(letter if letter.isprintable() else "?" for letter in line.strip()[:40])
+        return InputError(
+            f"expected {len(self.vertex.properties)} numbers for point {number}, found `{shown}`"
+        )
 
     def _sizes(self) -> Iterator[int]:
         for first in range(0, self.vertex.count, CHUNK_POINTS):
             yield min(CHUNK_POINTS, self.vertex.count - first)
+
+
+class _Lines:
+    """The lines of a text that are not blank.
+
+    Attributes:
+        number: How many were read.
+        last: The one that was read last.
+    """
+
+    def __init__(self, text: Iterable[str]) -> None:
+        self._lines = (line for line in text if not line.isspace())
+        self.number = 0
+        self.last = ""
+
+    def __iter__(self) -> _Lines:
+        return self
+
+    def __next__(self) -> str:
+        self.last = next(self._lines)
+        self.number += 1
+        return self.last
+
+
+def _truncated(expected: int, found: str) -> InputError:
+    return InputError(
+        f"expected {expected} points, found {found}",
+        "the file is truncated: copy or export it again",
+    )
