@@ -55,6 +55,15 @@ def test_the_origin_of_a_merged_cloud_is_no_station(tmp_path):
     assert not len(open_scan(write_e57(tmp_path / "b.e57", [shifted])).stations)
 
 
+def test_scans_posed_in_different_places_have_their_stations_there(tmp_path):
+    first = E57Part(xyz_fields(POINTS), (1, 0, 0, 0), (0, 0, 0))
+    second = E57Part(xyz_fields(POINTS), (1, 0, 0, 0), (3, 0, 0.5))
+    scan = open_scan(write_e57(tmp_path / "a.e57", [first, second]))
+    assert scan.stations.tolist() == [[0, 0, 0], [3, 0, 0.5]]
+    assert [chunk.station.tolist() for chunk in scan.chunks()] == [[0] * 3, [1] * 3]
+    assert not len(open_scan(write_e57(tmp_path / "b.e57", [second, second])).stations)
+
+
 def test_the_origin_of_a_scan_on_the_grid_or_in_angles_is_its_station(tmp_path):
     angles = {
         "sphericalRange": np.array([1.0, 2.0, 3.0]),

@@ -98,16 +98,20 @@ def _parts(file: Any) -> tuple[_Part, ...]:
     nodes = root["data3D"] if root.isDefined("data3D") else ()
     if not len(nodes):
         raise InputError("expected at least one scan in the file, found none")
+    poses = [_pose(nodes[index]) for index in range(len(nodes))]
+    apart = any(not np.array_equal(translation, poses[0][1]) for _, translation in poses)
     parts: list[_Part] = []
     stations = 0
-    for index in range(len(nodes)):
-        part = _part(nodes[index], index, len(nodes), stations)
+    for index, pose in enumerate(poses):
+        part = _part(nodes[index], index, pose, apart, stations)
         stations += part.station >= 0
         parts.append(part)
     return tuple(parts)
 
 
-def _part(node: Any, index: int, scans: int, stations: int) -> _Part:
+def _part(
+    node: Any, index: int, pose: tuple[Float64, Float64], apart: bool, stations: int
+) -> _Part:
     from pye57 import libe57
 
     points = node["points"]
@@ -117,15 +121,14 @@ def _part(node: Any, index: int, scans: int, stations: int) -> _Part:
         raise InputError(
             f"expected cartesian or spherical coordinates, found {', '.join(sorted(fields))}"
         )
-    rotation, translation = _pose(node)
-    known = _is_measured_from_origin(node, fields) or (scans > 1 and bool(translation.any()))
+    rotation, translation = pose
     return _Part(
         index=index,
         count=int(points.childCount()),
         fields=fields,
         rotation=rotation,
         translation=translation,
-        station=stations if known else -1,
+        station=stations if apart or _is_measured_from_origin(node, fields) else -1,
         full=_full_brightness(node, prototype) if fields.issuperset(_COLOR) else 255.0,
     )
 
@@ -133,9 +136,10 @@ def _part(node: Any, index: int, scans: int, stations: int) -> _Part:
 def _is_measured_from_origin(node: Any, fields: frozenset[str]) -> bool:
     """Whether the origin of the scan's own frame is where the scanner stood.
 
-    It is for a scan on the scanner's grid (rows and columns) or in spherical coordinates. For
-    others the origin is just where a program put it: merged clouds are written with an identity
-    pose too, or with a pose that only carries a shift of the coordinates.
+    It is for a scan on the scanner's grid (rows and columns) or in spherical coordinates, and
+    where the scans of a file have their poses in different places. For others the origin is just
+    where a program put it: merged clouds are written with an identity pose too, or with a pose
+    that only carries a shift of the coordinates.
     """
     on_grid = {"rowIndex", "columnIndex"} <= fields
     return on_grid or fields.issuperset(_SPHERICAL) or node.isDefined("sphericalBounds")
