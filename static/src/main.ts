@@ -22,8 +22,15 @@ async function main(): Promise<void> {
     showPlain(host, words.noTour, words.retry);
     return;
   }
+  keepIcon();
   const decoder = new URL(DRACO_FOLDER, import.meta.url);
   new Visit(host, site, decoder, tour, roomOf(tour, host.dataset["room"] ?? null)).start();
+}
+
+/** The page's address will change with the rooms; what it names relatively must not. */
+function keepIcon(): void {
+  const icon = document.querySelector<HTMLLinkElement>("link[rel=icon]");
+  if (icon) icon.href = new URL(icon.href).href;
 }
 
 function canDraw(): boolean {

@@ -37,7 +37,6 @@ export class Pointer {
     canvas.addEventListener("pointerdown", (event) => {
       if (event.button !== 0) return;
       canvas.setPointerCapture(event.pointerId);
-      canvas.focus({ preventScroll: true });
       this.#press(event);
     });
     canvas.addEventListener("pointermove", (event) => this.#move(event));

@@ -9,6 +9,10 @@ import {
   type Vector3,
 } from "three";
 import type { Look } from "./look.ts";
+import { Sharpness } from "./sharpness.ts";
+
+/** What a step of the loop asks for: more steps because one moves or waits, or none. */
+export type Pace = "moving" | "waiting" | "still";
 
 const PIXEL_RATIO_MAX = 2;
 /** A slow machine walks no slower down to four pictures a second. */
@@ -26,7 +30,9 @@ export class Stage {
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(UPRIGHT_DEG, 1, NEAR_M, FAR_M);
   readonly size = new Vector2(1, 1);
-  readonly #frame: (dt: number) => boolean;
+  readonly #frame: (dt: number) => Pace;
+  readonly #sharpness = new Sharpness();
+  #sharp = 1;
   #zoom = 1;
   #scheduled = 0;
   #before: number | null = null;
@@ -35,10 +41,9 @@ export class Stage {
   /**
    * @param canvas Where to draw.
    * @param background CSS colour of the void.
-   * @param frame Called before each picture with seconds gone; true asks for another.
-   * Throws where WebGL 2 is missing.
+   * @param frame Called before each picture with the seconds gone.
    */
-  constructor(canvas: HTMLCanvasElement, background: string, frame: (dt: number) => boolean) {
+  constructor(canvas: HTMLCanvasElement, background: string, frame: (dt: number) => Pace) {
     this.#frame = frame;
     this.renderer = new WebGLRenderer({ canvas, antialias: true });
     this.scene.background = new Color(background);
@@ -83,13 +88,18 @@ export class Stage {
   #tick(now: number): void {
     const dt = this.#before === null ? 1 / 60 : Math.min(STEP_MAX_S, (now - this.#before) / 1000);
     this.#scheduled = 0;
-    const more = this.#frame(dt);
+    const pace = this.#frame(dt);
+    const sharp = this.#sharpness.next(dt, pace === "moving");
+    if (sharp !== this.#sharp) {
+      this.#sharp = sharp;
+      this.#resize();
+    }
     if (this.#dirty) {
       this.#dirty = false;
       this.renderer.render(this.scene, this.camera);
     }
-    this.#before = more ? now : null;
-    if (more) this.wake();
+    this.#before = pace === "still" ? null : now;
+    if (pace !== "still") this.wake();
   }
 
   #fit(): void {
@@ -97,12 +107,18 @@ export class Stage {
     const width = Math.max(1, canvas.clientWidth);
     const height = Math.max(1, canvas.clientHeight);
     this.size.set(width, height);
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, PIXEL_RATIO_MAX));
-    this.renderer.setSize(width, height, false);
+    this.#resize();
     this.camera.aspect = width / height;
     this.camera.fov = uprightField(width / height) * this.#zoom;
     this.camera.updateProjectionMatrix();
     this.draw();
+  }
+
+  #resize(): void {
+    const ratio = Math.min(window.devicePixelRatio, PIXEL_RATIO_MAX) * this.#sharp;
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(this.size.x, this.size.y, false);
+    this.#dirty = true;
   }
 }
 

@@ -7,8 +7,8 @@ export const PASS_M = 0.6;
 /** A door passes only someone who has been so far from it: who arrives beside one stays. */
 export const ARM_M = 1;
 /** The door's point may hang anywhere between the floor and the lintel. */
-const BELOW_M = 0.4;
-const ABOVE_M = 2.6;
+const BELOW_M = 0.2;
+const ABOVE_M = 2;
 
 export class Thresholds<T extends { readonly at: Triple }> {
   readonly #doors: readonly T[];

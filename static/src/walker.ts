@@ -37,11 +37,14 @@ export class Walker {
   readonly eye = new Vector3();
   readonly #collider: Collider;
   readonly #bounds: Bounds;
+  readonly #strideM: number;
   #height = EYE_M;
 
-  constructor(collider: Collider, bounds: Bounds) {
+  /** @param strideM What is walked without looking, less than a body's radius. */
+  constructor(collider: Collider, bounds: Bounds, strideM = STRIDE_M) {
     this.#collider = collider;
     this.#bounds = bounds;
+    this.#strideM = strideM;
   }
 
   /** Puts the eye at a point, standing on the floor that belongs to it. */
@@ -74,7 +77,7 @@ export class Walker {
     const y = this.feet.y;
     const way = Math.hypot(vx, vy) * dt;
     if (way > 0) {
-      const strides = Math.ceil(way / STRIDE_M);
+      const strides = Math.ceil(way / this.#strideM);
       const dx = (vx * dt) / strides;
       const dy = (vy * dt) / strides;
       for (let i = 0; i < strides; i++) if (!this.#stride(dx, dy)) break;

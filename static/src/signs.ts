@@ -1,0 +1,48 @@
+/** The buttons that stand for doors and notes. */
+
+import { element, icon, ICONS } from "./dom.ts";
+import type { Spot } from "./hotspots.ts";
+import type { Link, Note, Triple } from "./tour.ts";
+
+const DOOR_FADE_M = [9, 18] as const;
+const NOTE_FADE_M = [4, 8] as const;
+
+export interface SignEvents {
+  /** A door was clicked. */
+  door(link: Link): void;
+  /** The keyboard reached a sign, which may be behind one's back. */
+  reached(at: Triple): void;
+}
+
+export function doorSpot(link: Link, name: string, label: string, events: SignEvents): Spot {
+  const button = element(
+    "button",
+    { type: "button", class: "spot door", "data-to": link.to, "aria-label": label },
+    icon(ICONS.door),
+    element("span", {}, name),
+  );
+  button.addEventListener("click", () => events.door(link));
+  return spot(button, link.at, DOOR_FADE_M, events);
+}
+
+export function noteSpot(note: Note, title: string, open: () => void, events: SignEvents): Spot {
+  const button = element(
+    "button",
+    { type: "button", class: "spot note" },
+    element("span", {}, title),
+  );
+  button.addEventListener("click", open);
+  return spot(button, note.at, NOTE_FADE_M, events);
+}
+
+function spot(
+  button: HTMLButtonElement,
+  at: Triple,
+  fade: readonly [number, number],
+  events: SignEvents,
+): Spot {
+  button.addEventListener("focus", () => {
+    if (button.matches(":focus-visible")) events.reached(at);
+  });
+  return { at, button, fade };
+}
