@@ -22,7 +22,6 @@ from tourgen.tour import (
     TOUR_FILE,
     Box,
     Clean,
-    Form,
     Link,
     Note,
     Room,
@@ -31,10 +30,9 @@ from tourgen.tour import (
     Texture,
     TourHead,
     Viewpoint,
-    as_room_id,
-    keys,
-    tables,
 )
+from tourgen.tour_faults import keys, tables
+from tourgen.tour_values import Form, as_room_id
 
 _TABLES: Final[tuple[tuple[str, type[BaseModel], str], ...]] = (
     ("[tour]", TourHead, ""),

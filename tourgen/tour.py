@@ -10,21 +10,14 @@ z up. Paths are relative to the folder of the tour file.
 
 from __future__ import annotations
 
-import difflib
-import os
 import re
 import tomllib
-import types
-import unicodedata
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, TypeVar, get_args
+from typing import Annotated, Any, Final, Literal
 
-import numpy as np
 from pydantic import (
-    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -33,218 +26,32 @@ from pydantic import (
     ValidationInfo,
     model_validator,
 )
-from pydantic_core import ErrorDetails, PydanticCustomError
 
 from tourgen.errors import Faults, InputError
 from tourgen.scans import Scan, open_scan
+from tourgen.tour_faults import faults_of
+from tourgen.tour_values import (
+    Context,
+    File,
+    Languages,
+    NeighbourRef,
+    Number,
+    Pose,
+    Position,
+    RoomId,
+    RoomRef,
+    Stations,
+    Text,
+    TextFiles,
+    Whole,
+    fault,
+    near,
+)
 
 TOUR_FILE: Final = "tour.toml"
 UNITS: Final[Mapping[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 
-_READING_KEYS = {"id", "scans", "unit", "up", "clean"}
-_ROOM_ID = re.compile(r"(?!(con|prn|aux|nul|com\d|lpt\d)$)[a-z0-9][a-z0-9_-]{0,63}")
-_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
-_LANGUAGE = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{2,8})*")
-
-Model = TypeVar("Model", bound=BaseModel)
-
-
-@dataclass
-class _Context:
-    """What a key is checked against beside its own value.
-
-    Attributes:
-        folder: Where the paths start.
-        languages: The declared ones; empty where their declaration is itself at fault.
-        rooms: Every room id of the file.
-        room: Id of the room that is being validated; set by the room before its fields.
-        seen: The ids of the rooms validated so far.
-    """
-
-    folder: Path
-    languages: tuple[str, ...]
-    rooms: tuple[str, ...]
-    room: object = None
-    seen: set[str] = field(default_factory=set)
-
-
-def _fault(message: str, hint: str = "") -> PydanticCustomError:
-    return PydanticCustomError("tour", "{message}", {"message": message, "hint": hint})
-
-
-def _near(word: str, words: tuple[str, ...]) -> str:
-    """The hint that names the one of `words` that looks most like `word`, or ""."""
-    match = difflib.get_close_matches(word, words, 1)
-    return f"did you mean `{match[0]}`?" if match else ""
-
-
-def _listed(words: tuple[str, ...]) -> str:
-    return f"expected one of {', '.join(words)}" if len(words) != 1 else f"expected {words[0]}"
-
-
-# ------------------------------------------------------------------ values
-
-
-def _number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and bool(abs(value) < 1e9)
-
-
-def _check_position(value: object) -> object:
-    if isinstance(value, list | tuple) and len(value) == 3 and all(map(_number, value)):
-        return tuple(float(number) for number in value)
-    raise _fault(f"expected three numbers [x, y, z], found {_shown(value)}")
-
-
-def _check_pose(value: object) -> object:
-    rows = value if isinstance(value, list | tuple) else ()
-    if len(rows) != 4 or not all(
-        isinstance(row, list | tuple) and len(row) == 4 and all(map(_number, row)) for row in rows
-    ):
-        raise _fault(f"expected four rows of four numbers, found {_shown(value)}")
-    matrix = np.array(rows, dtype=np.float64)
-    turn = matrix[:3, :3]
-    rigid = np.allclose(turn @ turn.T, np.eye(3), atol=1e-3) and np.linalg.det(turn) > 0
-    if not rigid or not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0)):
-        raise _fault(
-            "expected a rotation and a shift with [0, 0, 0, 1] as its last row, "
-            f"found {_shown(value)}",
-            "scale by `unit` instead, and turn the axes by `up`",
-        )
-    return tuple(tuple(float(number) for number in row) for row in matrix)
-
-
-def _check_stations(value: object) -> object:
-    if value == "auto":
-        return value
-    if isinstance(value, list | tuple) and value:
-        return tuple(_check_position(position) for position in value)
-    raise _fault(f'expected "auto" or a list of positions [x, y, z], found {_shown(value)}')
-
-
-def _check_text(value: object, info: ValidationInfo) -> dict[str, str]:
-    """A string for every language, or a table; a language without an entry takes the first one."""
-    declared = info.context.languages if info.context else ()
-    if isinstance(value, str):
-        value = dict.fromkeys(declared or ("en",), value)
-    if not isinstance(value, dict) or not value:
-        raise _fault(f"expected a text or a table of texts by language, found {_shown(value)}")
-    for language, text in value.items():
-        if declared and language not in declared:
-            raise _fault(
-                f"language `{language}` is not declared, {_listed(declared)}",
-                _near(language, declared) or f"add it to `tour.languages`: {_shown(language)}",
-            )
-        if not isinstance(text, str) or not text.strip():
-            raise _fault(f"expected a text in language `{language}`, found {_shown(text)}")
-    texts: dict[str, str] = value
-    first = next(texts[language] for language in declared or texts if language in texts)
-    return {language: texts.get(language, first) for language in declared or texts}
-
-
-def _check_file(name: str, info: ValidationInfo) -> str:
-    if info.context is None:
-        return name
-    path = info.context.folder / name
-    # of os.path, which holds names that no system can have for missing files
-    if not os.path.isfile(path):
-        beside = os.listdir(path.parent) if os.path.isdir(path.parent) else ()
-        near = difflib.get_close_matches(path.name, beside, 1)
-        hint = f"did you mean `{Path(name).with_name(near[0]).as_posix()}`?" if near else ""
-        raise _fault(f"expected a file, found none at `{name}`", hint)
-    if path.stat().st_size == 0:
-        raise _fault(f"expected a file with contents, found `{name}` empty", "export it again")
-    return name
-
-
-def _check_text_files(value: object, info: ValidationInfo) -> dict[str, str]:
-    names = _check_text(value, info)
-    return {
-        language: _check_file(name.replace("{lang}", language), info)
-        for language, name in names.items()
-    }
-
-
-def is_room_id(value: str) -> bool:
-    """Whether it serves as a folder and an address on every system."""
-    return bool(_ROOM_ID.fullmatch(value))
-
-
-def as_room_id(name: str) -> str:
-    """The room id nearest to a name: "Küche 1" becomes "kuche-1"."""
-    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
-    room_id = re.sub(r"[^a-z0-9_]+", "-", plain).strip("-_")[:60]
-    return room_id if is_room_id(room_id) else f"room-{room_id}".strip("-")
-
-
-def _check_room_id(value: str, info: ValidationInfo) -> str:
-    if not is_room_id(value):
-        safe = as_room_id(value)
-        raise _fault(
-            "expected a name of a folder and an address: a-z, 0-9, - and _, at most 64 of them, "
-            f"found {_shown(value)}",
-            f"for example `{safe}`",
-        )
-    if info.context:
-        if value in info.context.seen:
-            raise _fault(f"expected a name of its own, found a second room `{value}`")
-        info.context.seen.add(value)
-    return value
-
-
-def _check_target(value: str, info: ValidationInfo) -> str:
-    if info.context and value not in info.context.rooms:
-        raise _fault(f"room `{value}` does not exist", _near(value, info.context.rooms))
-    return value
-
-
-def _check_neighbour(value: str, info: ValidationInfo) -> str:
-    if info.context and value == info.context.room:
-        raise _fault(f"expected another room, found a link of `{value}` to itself")
-    return _check_target(value, info)
-
-
-def _check_languages(value: tuple[str, ...]) -> tuple[str, ...]:
-    for language in value:
-        if not _LANGUAGE.fullmatch(language):
-            raise _fault(
-                f'expected language codes such as "en" or "pt-BR", found {_shown(language)}'
-            )
-    if len(set(value)) < len(value):
-        raise _fault(f"expected each language once, found {_shown(list(value))}")
-    return value
-
-
-def _as_reference(value: object) -> object:
-    return {"file": value} if isinstance(value, str) else value
-
-
-@dataclass(frozen=True)
-class Form:
-    """How the documentation writes a kind of value."""
-
-    words: str
-
-
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False), Form("number")]
-Whole = Annotated[int, Field(strict=True), Form("whole number")]
-Position = Annotated[
-    tuple[float, float, float], BeforeValidator(_check_position), Form("`[x, y, z]`")
-]
-Row = tuple[float, float, float, float]
-Pose = Annotated[
-    tuple[Row, Row, Row, Row], BeforeValidator(_check_pose), Form("four rows of four numbers")
-]
-Stations = Annotated[
-    Literal["auto"] | tuple[tuple[float, float, float], ...],
-    BeforeValidator(_check_stations),
-    Form('`"auto"` or a list of `[x, y, z]`'),
-]
-Text = Annotated[Mapping[str, str], BeforeValidator(_check_text), Form("text")]
-TextFiles = Annotated[
-    Mapping[str, str], BeforeValidator(_check_text_files), Form("file name, or table by language")
-]
-File = Annotated[str, AfterValidator(_check_file), Form("file name")]
-RoomId = Annotated[str, Form("id of a room")]
+_READING_KEYS: Final = {"id", "scans", "unit", "up", "clean"}
 
 
 # ------------------------------------------------------------------ tables
@@ -264,7 +71,7 @@ class Box(_Table):
     def _has_inside(self) -> Box:
         for axis, low, high in zip("xyz", self.min, self.max, strict=True):
             if low >= high:
-                raise _fault(f"expected min below max along {axis}, found {low:g} and {high:g}")
+                raise fault(f"expected min below max along {axis}, found {low:g} and {high:g}")
         return self
 
 
@@ -277,7 +84,7 @@ class Viewpoint(_Table):
     @model_validator(mode="after")
     def _looks_somewhere(self) -> Viewpoint:
         if self.position == self.look_at:
-            raise _fault("expected `look_at` away from `position`, found both at one place")
+            raise fault("expected `look_at` away from `position`, found both at one place")
         return self
 
 
@@ -295,6 +102,10 @@ class ScanRef(_Table):
         description="Where the scanner stood, in this scan's coordinates before `pose`; "
         "only for a scan from one station.",
     )
+
+
+def _as_reference(value: object) -> object:
+    return {"file": value} if isinstance(value, str) else value
 
 
 class Clean(_Table):
@@ -351,9 +162,7 @@ class Texture(_Table):
 class Link(_Table):
     """A door to another room."""
 
-    to: Annotated[RoomId, AfterValidator(_check_neighbour)] = Field(
-        description="The room behind the door, by its `id`."
-    )
+    to: NeighbourRef = Field(description="The room behind the door, by its `id`.")
     at: Position = Field(description="Where the door's mark stands in this room, metres.")
     title: Text | None = Field(
         default=None, description="What the mark says. Left out: the title of the other room."
@@ -377,9 +186,7 @@ class Note(_Table):
 class Room(_Table):
     """A room of the tour."""
 
-    id: Annotated[RoomId, AfterValidator(_check_room_id)] = Field(
-        description="Name of the room's folder and address: a-z, 0-9, - and _."
-    )
+    id: RoomId = Field(description="Name of the room's folder and address: a-z, 0-9, - and _.")
     title: Text = Field(default={}, description="The room's name. Left out: its `id`.")
     scans: tuple[Annotated[ScanRef, BeforeValidator(_as_reference)], ...] = Field(
         min_length=1, description="The room's scans: file names or tables."
@@ -439,12 +246,12 @@ class TourHead(_Table):
     """The tour as a whole."""
 
     title: Text = Field(description="The tour's name.")
-    languages: Annotated[tuple[str, ...], AfterValidator(_check_languages)] = Field(
+    languages: Languages = Field(
         default=("en",),
         min_length=1,
         description="Codes of the languages that the texts are in; the first one is shown first.",
     )
-    start: Annotated[RoomId, AfterValidator(_check_target)] | None = Field(
+    start: RoomRef | None = Field(
         default=None, description="The room in which the tour starts. Left out: the first one."
     )
 
@@ -483,7 +290,7 @@ class Tour(_Table):
             if room.id == room_id:
                 return room
         ids = tuple(room.id for room in self.rooms)
-        raise InputError(f"{TOUR_FILE}: room `{room_id}` does not exist", _near(room_id, ids))
+        raise InputError(f"{TOUR_FILE}: room `{room_id}` does not exist", near(room_id, ids))
 
 
 # ------------------------------------------------------------------ reading
@@ -527,6 +334,13 @@ def check_tour(folder: Path) -> tuple[Tour, tuple[str, ...]]:
     return tour, check_scans(tour)
 
 
+def _faults(error: ValidationError, data: Mapping[str, Any]) -> tuple[InputError, ...]:
+    return tuple(
+        InputError(f"{TOUR_FILE}: {each.message}", each.hint)
+        for each in faults_of(error, data, _File)
+    )
+
+
 def _readable_rooms(folder: Path, data: Mapping[str, Any]) -> Iterator[Room]:
     """Of a tour file at fault, the rooms whose scans can be checked all the same."""
     tables = data.get("room")
@@ -564,18 +378,16 @@ def _tour(folder: Path, file: _File) -> Tour:
 
 def _parse(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n"))
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
-        fault = InputError(
+        told = InputError(
             f"{TOUR_FILE}: expected a file in `{path.parent}`, found none",
             f"write one with `tourgen new {path.parent}`",
         )
     except OSError as error:
-        fault = InputError(
-            f"{TOUR_FILE}: expected a file that can be read, found: {error.strerror}"
-        )
+        told = InputError(f"{TOUR_FILE}: expected a file that can be read, found: {error.strerror}")
     except UnicodeDecodeError as error:
-        fault = InputError(
+        told = InputError(
             f"{TOUR_FILE}: expected UTF-8, found byte {error.object[error.start]:#x} at "
             f"position {error.start}",
             "save the file as UTF-8",
@@ -584,13 +396,13 @@ def _parse(path: Path) -> dict[str, Any]:
         place = re.search(r"^(.*) \(at (?:line (\d+), column (\d+)|end of document)\)$", str(error))
         reason = place[1] if place else str(error)
         where = f"line {place[2]}, column {place[3]}" if place and place[2] else "end of the file"
-        fault = InputError(
+        told = InputError(
             f"{TOUR_FILE}: {where}: expected TOML, found: {reason[:1].lower()}{reason[1:]}"
         )
-    raise Faults((fault,)) from None
+    raise Faults((told,)) from None
 
 
-def _context(folder: Path, data: Mapping[str, Any]) -> _Context:
+def _context(folder: Path, data: Mapping[str, Any]) -> Context:
     head, rooms = data.get("tour"), data.get("room")
     languages = head.get("languages", ["en"]) if isinstance(head, dict) else []
     valid = isinstance(languages, list) and all(isinstance(name, str) for name in languages)
@@ -599,7 +411,7 @@ def _context(folder: Path, data: Mapping[str, Any]) -> _Context:
         if isinstance(rooms, list)
         else []
     )
-    return _Context(
+    return Context(
         folder,
         tuple(languages) if valid else (),
         tuple(name for name in ids if isinstance(name, str)),
@@ -648,8 +460,8 @@ def _check_headers(
         for reference in room.scans:
             try:
                 scans.append(_open(room, reference, folder))
-            except InputError as fault:
-                faults.append(InputError(f"room `{room.id}`: {fault.message}", fault.hint))
+            except InputError as error:
+                faults.append(InputError(f"room `{room.id}`: {error.message}", error.hint))
         warnings += (f"room `{room.id}`: {each}" for scan in scans for each in scan.warnings)
         found = sum(scan.point_count for scan in scans)
         if len(scans) == len(room.scans) and found < room.clean.min_points:
@@ -673,135 +485,3 @@ def _open(room: Room, scan: ScanRef, folder: Path) -> Scan:
         pose=scan.pose,
         station=scan.station,
     )
-
-
-# ------------------------------------------------------------------ faults
-
-Location = tuple[int | str, ...]
-
-
-def _faults(error: ValidationError, data: Mapping[str, Any]) -> tuple[InputError, ...]:
-    details = [
-        detail
-        for detail in error.errors()
-        # a list whose items are all at fault counts as empty for pydantic
-        if detail["type"] != "too_short" or not detail["input"]
-    ]
-    details.sort(key=lambda detail: _place(detail["loc"], data))
-    return tuple(_told(detail, data) for detail in details)
-
-
-def _place(location: Location, data: Any) -> tuple[int, ...]:
-    """Sorts as the keys stand in the file; tomllib keeps their order. A missing key comes first."""
-    place = []
-    for key in location:
-        if isinstance(data, dict):
-            place.append(list(data).index(key) if key in data else -1)
-            data = data.get(str(key))
-        elif isinstance(data, list) and isinstance(key, int):
-            place.append(key)
-            data = data[key]
-    return tuple(place)
-
-
-def _told(detail: ErrorDetails, data: Mapping[str, Any]) -> InputError:
-    message, hint = _words(detail)
-    return InputError(
-        _CONTROL.sub("?", f"{TOUR_FILE}: {_subject(detail['loc'], data)}: {message}"),
-        _CONTROL.sub("?", hint),
-    )
-
-
-def _subject(location: Location, data: Mapping[str, Any]) -> str:
-    """Room and key in words: ("room", 0, "link", 1, "to") -> room `kitchen`: link 2: to."""
-    parts: list[str] = []
-    if location[0] == "room" and len(location) > 1 and isinstance(location[1], int):
-        table = data["room"][location[1]]
-        name = table.get("id") if isinstance(table, dict) else None
-        parts.append(f"room `{name}`" if isinstance(name, str) else f"room {location[1] + 1}")
-        location = location[2:]
-    joined = ""
-    for key in location:
-        if isinstance(key, int):
-            parts.append(f"{joined} {key + 1}")
-            joined = ""
-        else:
-            joined = f"{joined}.{key}" if joined else key
-    return ": ".join([*parts, joined] if joined else parts)
-
-
-def _words(detail: ErrorDetails) -> tuple[str, str]:
-    """What was expected and found, and the hint."""
-    kind, context, found = detail["type"], detail.get("ctx", {}), _shown(detail["input"])
-    if kind == "tour":
-        return context["message"], context["hint"]
-    if kind == "missing":
-        return "expected this key, found none", ""
-    if kind == "extra_forbidden":
-        return _unknown_key(detail["loc"])
-    if kind == "literal_error":
-        words = tuple(re.findall(r"'([^']*)'", context["expected"]))
-        return f"{_listed(words)}, found {found}", _near(str(detail["input"]), words)
-    if kind == "tuple_type" and isinstance(detail["input"], dict):
-        return "expected a list, found a table", f"write `[[{detail['loc'][-1]}]]` above it"
-    expected = {
-        "float_type": "a number",
-        "int_type": "a whole number",
-        "finite_number": "a finite number",
-        "string_type": "a string",
-        "tuple_type": "a list",
-        "model_type": "a table",
-        "too_short": "at least one",
-        "greater_than_equal": f"at least {context.get('ge')}",
-        "less_than_equal": f"at most {context.get('le')}",
-    }.get(kind)
-    if expected is None:
-        return f"{detail['msg'][:1].lower()}{detail['msg'][1:]}, found {found}", ""
-    return f"expected {expected}, found {found}", ""
-
-
-def _unknown_key(location: Location) -> tuple[str, str]:
-    model: type[BaseModel] = _File
-    for key in location[:-1]:
-        if isinstance(key, str):
-            model = tables(model)[key]
-    known = tuple(sorted(keys(model)))
-    name = str(location[-1])
-    hint = _near(name, known)
-    if not hint:
-        inner = {key: f"{table}.{key}" for table, sub in tables(model).items() for key in keys(sub)}
-        near = difflib.get_close_matches(name, list(inner), 1)
-        hint = f"did you mean `{inner[near[0]]}`?" if near else ""
-    return f"unknown key, {_listed(known)}", hint
-
-
-def keys(model: type[BaseModel]) -> dict[str, Any]:
-    """The keys that a table may have, with what pydantic knows about each."""
-    return {info.alias or name: info for name, info in model.model_fields.items()}
-
-
-def tables(model: type[BaseModel]) -> dict[str, type[BaseModel]]:
-    """Of the keys of a table, those that hold tables themselves, or lists of them."""
-    found = {key: _table_in(info.annotation) for key, info in keys(model).items()}
-    return {key: table for key, table in found.items() if table}
-
-
-def _table_in(annotation: object) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and not isinstance(annotation, types.GenericAlias):
-        return annotation if issubclass(annotation, BaseModel) else None
-    return next(filter(None, map(_table_in, get_args(annotation))), None)
-
-
-def _shown(value: object) -> str:
-    """A value as TOML would write it, cut at 60 characters."""
-    if isinstance(value, bool):
-        text = str(value).lower()
-    elif isinstance(value, dict):
-        text = f"a table of {', '.join(value)}" if value else "an empty table"
-    elif isinstance(value, list | tuple):
-        text = f"[{', '.join(map(_shown, value))}]"
-    elif isinstance(value, str):
-        text = '"' + value.replace("\n", "\\n") + '"'
-    else:
-        text = str(value)
-    return text if len(text) <= 60 else text[:59] + "…"

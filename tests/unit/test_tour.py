@@ -234,6 +234,7 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(folder):
         ("stations = []", 'expected "auto" or a list of positions', ""),
         ("stations = [[0, 0]]", "stations: expected three numbers [x, y, z], found [0, 0]", ""),
         ("keep = { min = [0, 0, 0] }", "keep.max: expected this key, found none", ""),
+        ("keep = { min = [0, 1, 0], max = [1, 1, 1] }", "keep: expected min below max along y", ""),
         ("keep = [0, 0, 0]", "keep: expected a table, found [0, 0, 0]", ""),
         ('keep = { min = ["a", 0, 0], max = [1, 1, 1] }', "keep.min: expected three", ""),
         ("keep = { min = [nan, 0, 0], max = [1, 1, 1] }", "keep.min: expected three", ""),
