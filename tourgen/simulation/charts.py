@@ -21,6 +21,7 @@ Vector = tuple[float, float, float]
 Pair = tuple[float, float]
 
 CELL_M = 0.085
+LIP_M = 0.002  # how far a reveal stands proud of its wall, so that no ray slips between them
 
 
 @dataclass(frozen=True, slots=True)
@@ -394,7 +395,7 @@ def reveal(wall: Wall, opening: Opening, material: Material, sill: Material) -> 
     middle = wall.point(np.array(opening.s), np.array(opening.z))
     charts: list[Chart] = []
     for k, contour in enumerate(_contour(opening)):
-        near = wall.point(contour[:, 0], contour[:, 1])
+        near = wall.point(contour[:, 0], contour[:, 1], LIP_M)
         reach = opening.depth - ((near - middle) * out).sum(axis=1)
         steps = splits([0.0, 1.0], CELL_M / opening.depth)
         points = near + steps[:, None, None] * reach[None, :, None] * out

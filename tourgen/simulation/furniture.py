@@ -31,7 +31,7 @@ RAIL_M = 0.010  # radius of the thin rails
 def ellipsoid(center: Vector, radii: Vector, material: Material, segments: int = 16) -> list[Chart]:
     """A ball stretched along the axes."""
     turn = np.linspace(0, 2 * np.pi, segments + 1)
-    lift = np.linspace(-np.pi / 2 + 0.02, np.pi / 2 - 0.02, segments // 2 + 1)
+    lift = np.linspace(-np.pi / 2 + 1e-3, np.pi / 2 - 1e-3, segments // 2 + 1)
     ring = np.cos(lift)[:, None]
     points = np.stack(
         [
@@ -231,6 +231,7 @@ def round_table(body: Material, top: Material, radius: float) -> list[Chart]:
             (radius, 0.735),
             (radius, 0.75),
             (radius - 0.02, 0.76),
+            (radius - 0.15, 0.7592),
         ],
         (0, 0, 0),
         body,
@@ -293,7 +294,7 @@ def stove(height: float) -> list[Chart]:
     charts += rod((0, 0, 0.88), (0, 0, height + 0.01), 0.06, iron, segments=16)
     brass = look.plain(look.BRASS, 0.2)
     charts += revolve(
-        [(0.235, 0.38), (0.245, 0.385), (0.245, 0.41), (0.235, 0.415)],
+        [(0.2, 0.38), (0.245, 0.385), (0.245, 0.41), (0.2, 0.415)],
         (0, 0, 0),
         brass,
         segments=32,
@@ -321,14 +322,16 @@ def hanging_lamp(ceiling: float, globe: float) -> list[Chart]:
         segments=36,
     )
     charts += revolve(
-        [(0.05, globe + 0.105), (0.21, globe + 0.055)],
+        [(0.001, globe + 0.11), (0.05, globe + 0.105), (0.21, globe + 0.055)],
         (0, 0, 0),
         look.plain((240, 232, 214)),
         segments=36,
     )
     charts += ellipsoid((0, 0, globe), (0.1, 0.1, 0.1), look.plain((255, 244, 214), glow=6.0), 20)
     charts += revolve(
-        [(0.05, 0), (0.07, 0.01), (0.07, 0.03), (0.012, 0.05)], (0, 0, ceiling - 0.045), brass
+        [(0.001, 0), (0.05, 0), (0.07, 0.01), (0.07, 0.03), (0.012, 0.05)],
+        (0, 0, ceiling - 0.045),
+        brass,
     )
     return charts
 

@@ -59,13 +59,17 @@ def noise(x: Float32, y: Float32) -> Float32:
     flat = _table().reshape(-1)
     top = flat[j0 * TABLE + i0] * (1 - u) + flat[j0 * TABLE + i1] * u
     low = flat[j1 * TABLE + i0] * (1 - u) + flat[j1 * TABLE + i1] * u
-    return (top * (1 - v) + low * v).astype(np.float32)
+    blended: Float32 = (top * (1 - v) + low * v).astype(np.float32)
+    return blended
 
 
 def chance(i: Float32, j: Float32 | float = 0.0) -> Float32:
     """A number in [0, 1) for each pair of whole numbers, always the same."""
-    mixed = np.sin(np.float32(12.9898) * i + np.float32(78.233) * j) * np.float32(43758.547)
-    return (mixed - np.floor(mixed)).astype(np.float32)
+    whole = np.asarray(i, dtype=np.int64) * 73856093 ^ np.asarray(j, dtype=np.int64) * 19349663
+    for _ in range(2):
+        whole = (whole ^ (whole >> 15)) * 0x2C1B3C6D & 0xFFFFFFFF
+    share: Float32 = ((whole >> 8) / np.float64(1 << 24)).astype(np.float32)
+    return share
 
 
 def shade(color: Color, brightness: Float32) -> Float32:

@@ -106,11 +106,11 @@ def casing(opening: Opening, trim: Material) -> list[Chart]:
         brass = look.plain(look.BRASS, 0.15)
         ring = revolve(
             [
-                (w + 0.06, 0.0),
+                (w + 0.06, -0.04),
                 (w + 0.05, 0.03),
                 (w + 0.015, 0.042),
                 (w - 0.005, 0.03),
-                (w - 0.005, 0.0),
+                (w - 0.005, -0.02),
             ],
             (0, 0, 0),
             brass,
@@ -392,7 +392,7 @@ def round_side(
         charts += reveal(bulge, opening, plaster, plaster)
         tangent = bulge.outward(opening.s)
         x, y, _ = bulge.point(np.array(opening.s), np.array(0.0))
-        ring = place(casing(opening, looks.trim), at=(-opening.s, 0.012, 0))
+        ring = place(casing(opening, looks.trim), at=(-opening.s, 0.0, 0))
         charts += place(
             ring, float(np.arctan2(tangent[1], tangent[0])) - np.pi / 2, (float(x), float(y), 0.0)
         )

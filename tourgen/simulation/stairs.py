@@ -185,7 +185,7 @@ def stairs() -> RoomModel:
         if opening.round:
             out = wall.outward(opening.s)
             x, y, _ = wall.point(np.array(opening.s), np.array(0.0))
-            ring = place(casing(opening, oak), at=(-opening.s, 0.022, 0))
+            ring = place(casing(opening, oak), at=(-opening.s, 0.0, 0))
             charts += place(
                 ring, float(np.arctan2(out[1], out[0])) - np.pi / 2, (float(x), float(y), 0.0)
             )
@@ -286,7 +286,10 @@ def _sconce() -> list[Chart]:
         (0, 0, 0), (0.05, 0.05, 0.05), look.plain((255, 244, 214), glow=6.0), 14
     )
     charts += revolve(
-        [(0.012, -0.09), (0.03, -0.06), (0.04, -0.035)], (0, 0, 0), brass, segments=14
+        [(0.001, -0.09), (0.012, -0.09), (0.03, -0.06), (0.034, -0.035)],
+        (0, 0, 0),
+        brass,
+        segments=14,
     )
     charts += rod((0.0, 0.0, -0.085), (0.14, 0.0, -0.12), 0.009, brass)
     return charts + box((0.105, -0.03, -0.19), (0.14, 0.03, -0.05), brass)
@@ -296,7 +299,13 @@ def _lantern() -> list[Chart]:
     brass = look.plain(look.BRASS, 0.2)
     charts = rod((0, 0, TOP - 0.25), (0, 0, TOP + 0.3), 0.012, brass)
     charts += revolve(
-        [(0.1, TOP - 0.30), (0.11, TOP - 0.28), (0.03, TOP - 0.22), (0.012, TOP - 0.2)],
+        [
+            (0.001, TOP - 0.298),
+            (0.1, TOP - 0.30),
+            (0.11, TOP - 0.28),
+            (0.03, TOP - 0.22),
+            (0.012, TOP - 0.2),
+        ],
         (0, 0, 0),
         brass,
     )
