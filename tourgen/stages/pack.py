@@ -2,8 +2,8 @@
 
 All tiles of a room are quantised on one grid, so that vertices which two tiles share decode to
 the same bits and no pinhole shows along the seam. The grid's step is a power of two (2^-12 m,
-0.244 mm) and its origin a multiple of it: every grid position is then a float32 without
-rounding, up to 4 km of room, and decoding is exact on any machine.
+0.244 mm) and its origin a multiple of it: every position of the grid is then a float32 without
+rounding, up to 4 km of room, and a decoder is off by the last bit at most.
 
 glTF is y-up: (x, y, z) of the room is (x, z, -y) here, and nowhere else.
 """

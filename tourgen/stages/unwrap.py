@@ -31,7 +31,8 @@ _LABEL_ROUNDS = 12
 _LABEL_WEIGHT = 0.5
 _MERGE_COS = np.cos(np.radians(75.0))
 _RELAX_ROUNDS = 6
-_RINGS_OUT = 2
+_FEW_FOLDS = 0.1
+_LEAST_AREA = 0.1
 _HALVE_GAIN = 0.7
 _ANGLES = np.radians(np.arange(0.0, 90.0, 3.0))
 _UNTANGLE_ROUNDS = 4
@@ -145,7 +146,7 @@ def _segment(topology: _Topology, settings: Settings) -> Int64:
         votes = share @ np.eye(len(axes))[label]
         label = (likeness + _LABEL_WEIGHT * votes).argmax(1).astype(np.int64)
     chart = _components(topology, label)
-    return _merge_small(chart, normals, topology, settings.min_chart_faces)
+    return _merge_small(chart, normals, topology, settings.min_chart_faces, 0.0)
 
 
 def _smoothed(topology: _Topology) -> Float64:
@@ -180,7 +181,9 @@ def _axes(normals: Float64, areas: Float64) -> Float64:
     return axes
 
 
-def _merge_small(chart: Int64, normals: Float64, topology: _Topology, least: int) -> Int64:
+def _merge_small(
+    chart: Int64, normals: Float64, topology: _Topology, least: int, least_cos: float
+) -> Int64:
     """Join charts of few faces to the neighbour that shares most border with them."""
     count = int(chart.max()) + 1
     faces = np.bincount(chart, minlength=count)
@@ -204,7 +207,7 @@ def _merge_small(chart: Int64, normals: Float64, topology: _Topology, least: int
                 neighbours[small][other],
             ),
         )
-        if axis @ _unit(sums[best]) < 0:
+        if axis @ _unit(sums[best]) < least_cos:
             continue
         target[small] = best
         faces[best] += faces[small]
@@ -217,7 +220,7 @@ def _merge_small(chart: Int64, normals: Float64, topology: _Topology, least: int
         neighbours[small] = {}
     while (target[target] != target).any():
         target = target[target]
-    return np.unique(target[chart], return_inverse=True)[1].astype(np.int64)
+    return _numbered(target[chart])
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,6 +233,7 @@ class _Charts:
         faces: (f, 3) indices of chart vertices.
         flat: (u, 2) metres.
         vertex_chart: (u,) chart of each chart vertex.
+        bad: (f,) faces that lie on another face of their chart, or upside down.
     """
 
     chart: Int64
@@ -237,25 +241,56 @@ class _Charts:
     faces: Int64
     flat: Float64
     vertex_chart: Int64
+    bad: Bool
 
 
 def _charts(mesh: Mesh, topology: _Topology, chart: Int64, settings: Settings) -> _Charts:
-    """Flatten; cut what folds over itself or fills its box badly, and flatten that again.
+    """Flatten; mend what folds over itself, cut what fills its box badly, join what is small."""
+    charts = _unfolded(mesh, topology, chart, settings)
+    halved = _halve(charts, settings.min_chart_faces)
+    if not np.array_equal(halved, charts.chart):
+        charts = _unfolded(mesh, topology, _components(topology, halved), settings)
+    return _joined(mesh, topology, charts, settings)
 
-    Each round only cuts, and a face alone cannot fold, so the rounds end.
-    """
-    charts = _flatten(mesh, topology, chart)
-    round_ = 0
-    while True:
-        bad = _folded(charts, settings.texel_m)
-        if bad.any():
-            cut = _take_out(topology, charts.chart, bad, rings=_RINGS_OUT - round_)
-        else:
-            cut = _halve(charts, settings.min_chart_faces)
-        if np.array_equal(cut, charts.chart):
-            return charts
-        charts = _flatten(mesh, topology, _components(topology, cut))
-        round_ += 1
+
+def _unfolded(mesh: Mesh, topology: _Topology, chart: Int64, settings: Settings) -> _Charts:
+    """Cut until no chart folds; a round only cuts, and a face alone cannot fold: it ends."""
+    charts = _flatten(mesh, topology, chart, settings.texel_m)
+    while charts.bad.any():
+        cut = _components(topology, _cut(mesh, topology, charts.chart, charts.bad))
+        charts = _flatten(mesh, topology, cut, settings.texel_m)
+    return charts
+
+
+def _joined(mesh: Mesh, topology: _Topology, charts: _Charts, settings: Settings) -> _Charts:
+    """Join small charts to a neighbour; those that then fold or stretch go back."""
+    before = charts.chart
+    joined = _merge_small(before, topology.normals, topology, settings.min_chart_faces, -1.0)
+    sizes = np.bincount(before)
+    for last in (False, False, True):
+        tried = _flatten(mesh, topology, joined, settings.texel_m)
+        bad = tried.bad | _stretched(tried, topology)
+        if not bad.any():
+            return tried
+        # The largest of a group stays; of the others, those that hold a bad face leave it.
+        largest = np.zeros(int(joined.max()) + 1, np.int64)
+        np.maximum.at(largest, joined, sizes[before])
+        leaves = np.bincount(before, bad) > 0
+        leaving = leaves[before] & (sizes[before] < largest[joined])
+        groups = np.bincount(joined, bad) > 0
+        mended = np.bincount(joined, leaving) > 0
+        back = leaving | (groups & (last | ~mended))[joined]
+        joined = _numbered(np.where(back, before + joined.max() + 1, joined))
+    return _unfolded(mesh, topology, _components(topology, joined), settings)
+
+
+def _stretched(charts: _Charts, topology: _Topology) -> Bool:
+    """(f,) faces drawn at less than a part of their area."""
+    return _signed_areas(charts.flat, charts.faces) < _LEAST_AREA * topology.areas
+
+
+def _numbered(label: Int64) -> Int64:
+    return np.unique(label, return_inverse=True)[1].astype(np.int64)
 
 
 def _components(topology: _Topology, label: Int64) -> Int64:
@@ -265,18 +300,27 @@ def _components(topology: _Topology, label: Int64) -> Int64:
     return connected_components(joined, directed=False)[1].astype(np.int64)
 
 
-def _take_out(topology: _Topology, chart: Int64, bad: Bool, rings: int) -> Int64:
-    """Make faces that fold charts of their own: with the rings about them, or singly below 0."""
-    next_chart = int(chart.max()) + 1
-    if rings < 0:
-        return np.where(bad, next_chart + np.arange(len(chart)), chart)
-    out = bad
+def _cut(mesh: Mesh, topology: _Topology, chart: Int64, bad: Bool) -> Int64:
+    """Where a few faces fold, take them out with those about them; where many do, cut in two."""
+    chart = chart.copy()
+    faces, folds = np.bincount(chart), np.bincount(chart, bad)
+    few = bad & (folds < _FEW_FOLDS * faces)[chart]
     one, two = topology.pairs[chart[topology.pairs[:, 0]] == chart[topology.pairs[:, 1]]].T
-    for _ in range(rings):
-        grown = out.copy()
-        grown[one] |= out[two]
-        grown[two] |= out[one]
-        out = grown
+    out = few.copy()
+    out[one] |= few[two]
+    out[two] |= few[one]
+    centers = mesh.vertices[mesh.faces].mean(1, dtype=np.float64)
+    next_chart = len(faces)
+    for which in np.flatnonzero(folds >= np.maximum(_FEW_FOLDS * faces, 1)):
+        inside = np.flatnonzero(chart == which)
+        place = centers[inside] - centers[inside].mean(0)
+        size = np.sqrt((place**2).sum(1).mean())
+        feature = np.concatenate([place / max(size, 1e-30), 2 * topology.normals[inside]], axis=1)
+        side = _two_means(feature)
+        if side.all() or not side.any():
+            side = np.arange(len(inside)) < len(inside) // 2
+        chart[inside[side]] = next_chart
+        next_chart += 1
     return np.where(out, chart + next_chart, chart)
 
 
@@ -319,7 +363,8 @@ def _box_area(corners: Float64) -> float:
     return float((np.ptp(across, axis=0) * np.ptp(down, axis=0)).min())
 
 
-def _flatten(mesh: Mesh, topology: _Topology, chart: Int64) -> _Charts:
+def _flatten(mesh: Mesh, topology: _Topology, chart: Int64, texel_m: float) -> _Charts:
+    """Each chart into a plane: seen from the front and relaxed, or conformally where that folds."""
     vertices = mesh.vertices.astype(np.float64)
     key = chart[:, None] * len(vertices) + mesh.faces
     unique, faces = np.unique(key, return_inverse=True)
@@ -333,17 +378,28 @@ def _flatten(mesh: Mesh, topology: _Topology, chart: Int64) -> _Charts:
     right = _unit(np.cross(least, axis))
     up = np.cross(axis, right)
     at = vertices[source]
-    flat = np.stack([(at * right[vertex_chart]).sum(1), (at * up[vertex_chart]).sum(1)], axis=1)
-    flat = _untangle(_relax(at, faces, flat, vertex_chart), faces)
-    return _Charts(chart, source, faces, flat, vertex_chart)
+    seen = np.stack([(at * right[vertex_chart]).sum(1), (at * up[vertex_chart]).sum(1)], axis=1)
+    own = _laid(at[faces])
+    flat = _untangle(_relax(own, faces, seen, vertex_chart), faces)
+    bad = _folded(flat, faces, chart, vertex_chart, texel_m)
+    folds = np.bincount(chart, bad)
+    if bad.any():
+        some = folds[chart] > 0
+        used, again = np.unique(faces[some], return_inverse=True)
+        again = again.reshape(-1, 3)
+        owner = vertex_chart[used]
+        start = _conformal(own[some], again, seen[used], at[used], owner)
+        other = flat.copy()
+        other[used] = _untangle(_relax(own[some], again, start, owner), again)
+        folded = _folded(other, faces, chart, vertex_chart, texel_m)
+        better = np.bincount(chart, folded) < folds
+        flat = np.where(better[vertex_chart, None], other, flat)
+        bad = np.where(better[chart], folded, bad)
+    return _Charts(chart, source, faces, flat, vertex_chart, bad)
 
 
-def _relax(at: Float64, faces: Int64, flat: Float64, vertex_chart: Int64) -> Float64:
-    """As rigid as possible: each face keeps its shape as far as its neighbours let it.
-
-    Liu, Zhang, Xu, Gotsman, Gortler: A local/global approach to mesh parameterization, 2008.
-    """
-    corners = at[faces]
+def _laid(corners: Float64) -> Float64:
+    """(f, 3, 2) each face in its own plane, its first edge along the first axis."""
     edge = corners[:, 1] - corners[:, 0]
     length = np.linalg.norm(edge, axis=1)
     along = edge / np.maximum(length, 1e-30)[:, None]
@@ -351,8 +407,46 @@ def _relax(at: Float64, faces: Int64, flat: Float64, vertex_chart: Int64) -> Flo
     x = (other * along).sum(1)
     y = np.linalg.norm(other - x[:, None] * along, axis=1)
     zero = np.zeros_like(x)
-    own = np.stack([zero, zero, length, zero, x, y], axis=1).reshape(-1, 3, 2)
+    return np.stack([zero, zero, length, zero, x, y], axis=1).reshape(-1, 3, 2)
 
+
+def _conformal(
+    own: Float64, faces: Int64, seen: Float64, at: Float64, vertex_chart: Int64
+) -> Float64:
+    """Angles kept as far as possible, two far vertices of each chart pinned.
+
+    It starts from no picture of the chart, so it opens folds that would stay folded if seen.
+
+    Lévy, Petitjean, Ray, Maillot: Least squares conformal maps, 2002, in complex numbers.
+    """
+    count = len(seen)
+    plane = own[..., 0] + 1j * own[..., 1]
+    opposite = np.roll(plane, -2, 1) - np.roll(plane, -1, 1)
+    area = np.abs((np.conj(opposite[:, 2]) * opposite[:, 0]).imag)
+    value = opposite / np.sqrt(np.maximum(area, 1e-12))[:, None]
+    row = np.repeat(np.arange(len(faces)), 3)
+    residual = sparse.csr_matrix((value.ravel(), (row, faces.ravel())), shape=(len(faces), count))
+    # Far apart: the two ends along the axis in which the chart, as seen, is longest.
+    across = np.unique(vertex_chart, return_inverse=True)[1]
+    low, high = _boxes(seen, across, int(across.max()) + 1)
+    longest = (high - low).argmax(1)[across]
+    order = np.lexsort((seen[np.arange(count), longest], across))
+    first = np.flatnonzero(np.diff(across[order], prepend=-1))
+    last = np.append(first[1:], count) - 1
+    ends = order[first], order[last]
+    pin, target = np.zeros(count), np.zeros(count, complex)
+    pin[ends[0]] = pin[ends[1]] = 1.0
+    target[ends[1]] = np.linalg.norm(at[ends[1]] - at[ends[0]], axis=1)
+    normal = residual.conj().T @ residual + sparse.diags(pin + 1e-9)
+    solved = np.asarray(splu(sparse.csc_matrix(normal)).solve(pin * target))
+    return np.stack([solved.real, solved.imag], axis=1)
+
+
+def _relax(own: Float64, faces: Int64, flat: Float64, vertex_chart: Int64) -> Float64:
+    """As rigid as possible: each face keeps its shape as far as its neighbours let it.
+
+    Liu, Zhang, Xu, Gotsman, Gortler: A local/global approach to mesh parameterization, 2008.
+    """
     # Edge i runs from corner i + 1 to corner i + 2 and faces corner i.
     first, second = np.roll(own, -1, 1) - own, np.roll(own, -2, 1) - own
     cross = np.abs(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
@@ -430,30 +524,29 @@ def _untangle(flat: Float64, faces: Int64) -> Float64:
     return flat
 
 
-def _folded(charts: _Charts, texel_m: float) -> Bool:
+def _folded(flat: Float64, faces: Int64, chart: Int64, vertex_chart: Int64, texel_m: float) -> Bool:
     """(f,) faces that lie on another face of their chart, or upside down.
 
-    Charts are rasterised apart from one another, at half a texel or a third of an edge.
+    Charts are rasterised apart from one another, at a texel or a third of an edge.
     """
-    areas = _signed_areas(charts.flat, charts.faces)
-    bad = areas < 0
-    step = max(texel_m, float(np.sqrt(2 * np.abs(areas).mean())) / 3)
-    count = int(charts.chart.max()) + 1
-    low, high = _boxes(charts.flat, charts.vertex_chart, count)
+    areas = _signed_areas(flat, faces)
+    bad: Bool = areas < 0
+    step = max(texel_m, float(np.sqrt(2 * np.abs(areas).mean())) / 3, 1e-6)
+    low, high = _boxes(flat, vertex_chart, int(chart.max()) + 1)
     heights = np.ceil((high - low)[:, 1] / step).astype(np.int64) + 2
     tops = np.cumsum(heights) - heights
-    at = (charts.flat - low[charts.vertex_chart]) / step + 1
-    at[:, 1] += tops[charts.vertex_chart]
+    at = (flat - low[vertex_chart]) / step + 1
+    at[:, 1] += tops[vertex_chart]
     width = int(np.ceil((high - low)[:, 0].max() / step)) + 3
-    hits = rasterize(at[charts.faces], width, int(heights.sum()))
+    hits = rasterize(at[faces], width, int(heights.sum()))
     # A centre on a common edge belongs to both of its faces, and is no overlap.
     deep = hits.barycentric.min(1) > 1e-3
     key = hits.row[deep].astype(np.int64) * width + hits.column[deep]
     order = np.argsort(key, kind="stable")
     twice = np.flatnonzero(np.diff(key[order]) == 0)
-    faces = hits.face[deep][order]
-    bad[faces[twice]] = True
-    bad[faces[twice + 1]] = True
+    found = hits.face[deep][order]
+    bad[found[twice]] = True
+    bad[found[twice + 1]] = True
     return bad
 
 
