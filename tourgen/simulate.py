@@ -25,7 +25,7 @@ from tourgen.simulation.scanner import (
     SPARE,
     Grid,
     Returns,
-    Stage,
+    Scenery,
     Station,
     panorama,
     rotated,
@@ -72,12 +72,12 @@ def simulate_room(model: RoomModel, folder: Path, size: Size) -> None:
     """
     seed = [VERSION, *model.id.encode()]
     truth = build_truth(model, size.texture, int(np.random.default_rng(seed).integers(2**31)))
-    stage = Stage(model, truth)
+    scenery = Scenery(model, truth)
     stations = stations_of(model, np.random.default_rng([*seed, 1]))
-    scans = _thinned(_scans(stage, model, stations, size.points, seed), size.points, seed)
+    scans = _thinned(_scans(scenery, model, stations, size.points, seed), size.points, seed)
     pictures = (
         [
-            panorama(stage, s, size.panorama, passer_by=k == model.passer_by_station)
+            panorama(scenery, s, size.panorama, passer_by=k == model.passer_by_station)
             for k, s in enumerate(stations)
         ]
         if size.e57
@@ -106,16 +106,16 @@ def simulate_room(model: RoomModel, folder: Path, size: Size) -> None:
 
 
 def _scans(
-    stage: Stage, model: RoomModel, stations: Sequence[Station], points: int, seed: list[int]
+    scenery: Scenery, model: RoomModel, stations: Sequence[Station], points: int, seed: list[int]
 ) -> list[Returns]:
     """A little more than ``points`` returns on the coarsest grid that gives them."""
-    per_square_degree = share_of_returns(stage, list(stations))
+    per_square_degree = share_of_returns(scenery, list(stations))
     step = float(np.sqrt(per_square_degree / (points * SPARE)))
     while True:
         grid = Grid.of_step(step)
         rng = np.random.default_rng([*seed, 3])
         scans = [
-            scan(stage, s, grid, passer_by=k == model.passer_by_station, rng=rng)
+            scan(scenery, s, grid, passer_by=k == model.passer_by_station, rng=rng)
             for k, s in enumerate(stations)
         ]
         if sum(map(len, scans)) >= points:

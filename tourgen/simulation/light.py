@@ -7,7 +7,6 @@ Synthesis", 1993): every vertex remembers what its rays hit, so that a bounce is
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,19 +21,13 @@ BOUNCES = 5
 PANE_SAMPLES = 9
 LAMP_SAMPLES = 3
 WHITE_BALANCE = 0.8  # share of the room's own tint that the camera takes out
+# Radiance of what is seen through an opening; a door shows the next, dimmer room.
 SKY = {
     "window": np.array([1.0, 1.04, 1.10]),
     "porthole": np.array([1.0, 1.04, 1.10]) * 1.5,
     "door": np.array([0.42, 0.34, 0.25]),
 }
 SUN = np.array([9.0, 7.4, 5.2])
-
-
-@dataclass(frozen=True, slots=True)
-class Sun:
-    """Direction (3,) from the room towards the sun."""
-
-    direction: Float64
 
 
 def ray_scene(vertices: Float64, faces: Any) -> Any:
@@ -243,7 +236,7 @@ def _filled(charts: Sequence[Chart], mesh: ChartMesh, light: Float64, valid: Boo
         if not open_.all():
             i, j = distance_transform_edt(~open_, return_distances=False, return_indices=True)
             grid = grid[i, j]
-        grid = _smooth(grid)
+        grid = _smooth(_smooth(grid))
         if np.allclose(part.points[:, 0], part.points[:, -1]):
             grid[:, 0] = grid[:, -1] = (grid[:, 1] + grid[:, -2]) / 2
         out[span] = grid.reshape(-1, 3)

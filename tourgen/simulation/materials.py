@@ -18,7 +18,7 @@ TABLE = 1024
 
 OAK: Color = (176, 124, 74)
 DARK_OAK: Color = (128, 82, 46)
-MAHOGANY: Color = (132, 66, 40)
+MAHOGANY: Color = (126, 70, 46)
 EBONY: Color = (48, 34, 28)
 MAPLE: Color = (219, 184, 130)
 BRASS: Color = (206, 166, 84)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -163,10 +163,16 @@ def glazing(opening: Opening, trim: Material) -> list[Chart]:
     return charts
 
 
+def ring_on(wall: RoundWall, opening: Opening, trim: Material) -> list[Chart]:
+    """The frame of a porthole, flat against a round wall."""
+    out = wall.outward(opening.s)
+    x, y, _ = wall.point(np.array(opening.s), np.array(0.0))
+    ring = place(casing(opening, trim), at=(-opening.s, 0.0, 0.0))
+    return place(ring, float(np.arctan2(out[1], out[0])) - np.pi / 2, (float(x), float(y), 0.0))
+
+
 def _tipped(charts: Sequence[Chart]) -> list[Chart]:
     """Turned pieces laid on their side: their axis, up, becomes -y."""
-    from dataclasses import replace
-
     return [
         replace(
             part,
@@ -390,12 +396,7 @@ def round_side(
     )
     for opening in openings:
         charts += reveal(bulge, opening, plaster, plaster)
-        tangent = bulge.outward(opening.s)
-        x, y, _ = bulge.point(np.array(opening.s), np.array(0.0))
-        ring = place(casing(opening, looks.trim), at=(-opening.s, 0.0, 0))
-        charts += place(
-            ring, float(np.arctan2(tangent[1], tangent[0])) - np.pi / 2, (float(x), float(y), 0.0)
-        )
+        charts += ring_on(bulge, opening, looks.trim)
     return charts
 
 

@@ -158,7 +158,7 @@ class Beams:
     slope: Float64
 
 
-class Stage:
+class Scenery:
     """The ray casting scenes of one room: its surfaces, and the person who passes by."""
 
     def __init__(self, model: RoomModel, truth: TrueRoom) -> None:
@@ -319,13 +319,13 @@ def rotated(vectors: Float64, rotation: Float64) -> Float64:
     return np.stack([(vectors * rotation[k]).sum(axis=1) for k in range(3)], axis=1)
 
 
-def share_of_returns(stage: Stage, stations: list[Station]) -> float:
+def share_of_returns(scenery: Scenery, stations: list[Station]) -> float:
     """Returns per square degree of grid, all stations together, from a coarse look round."""
     grid = Grid.of_step(1.0)
     local = grid.directions(0, grid.rows)
     total = 0
     for station in stations:
-        beams = stage.look(
+        beams = scenery.look(
             station.true.position,
             rotated(local, station.true.rotation),
             passer_by=False,
@@ -336,11 +336,11 @@ def share_of_returns(stage: Stage, stations: list[Station]) -> float:
 
 
 def scan(
-    stage: Stage, station: Station, grid: Grid, *, passer_by: bool, rng: np.random.Generator
+    scenery: Scenery, station: Station, grid: Grid, *, passer_by: bool, rng: np.random.Generator
 ) -> Returns:
     """All that one station measures."""
     parts = [
-        _block(stage, station, grid, rows, passer_by=passer_by, rng=rng) for rows in _blocks(grid)
+        _block(scenery, station, grid, rows, passer_by=passer_by, rng=rng) for rows in _blocks(grid)
     ]
     return Returns.joined(parts)
 
@@ -352,7 +352,7 @@ def _blocks(grid: Grid) -> Iterator[tuple[int, int]]:
 
 
 def _block(
-    stage: Stage,
+    scenery: Scenery,
     station: Station,
     grid: Grid,
     rows: tuple[int, int],
@@ -364,12 +364,12 @@ def _block(
     above = min(last + 1, grid.rows)  # one more row, to see the depth edges of the last one
     local = grid.directions(first, above)
     world = rotated(local, station.true.rotation)
-    beams = stage.look(station.true.position, world, passer_by=passer_by, rng=rng)
+    beams = scenery.look(station.true.position, world, passer_by=passer_by, rng=rng)
     reach, colors, label = _mixed(beams, grid, rng)
     keep = (last - first) * grid.columns
     reach, colors, label = reach[:keep], colors[:keep], label[:keep]
     local, world = local[:keep], world[:keep]
-    stray = stage.strays(station.true.position, world, ~np.isfinite(reach), rng)
+    stray = scenery.strays(station.true.position, world, ~np.isfinite(reach), rng)
     reach[stray] = rng.uniform(*STRAY_RANGE_M, int(stray.sum()))
     sky = (
         150
@@ -418,7 +418,7 @@ def _mixed(beams: Beams, grid: Grid, rng: np.random.Generator) -> tuple[Float64,
     return out_reach, out_colors, out_label
 
 
-def panorama(stage: Stage, station: Station, height: int, *, passer_by: bool) -> UInt8:
+def panorama(scenery: Scenery, station: Station, height: int, *, passer_by: bool) -> UInt8:
     """(h, 2h, 3) the station's picture; azimuth falls from +180 to -180 degrees to the right."""
     width = 2 * height
     azimuth = np.pi - 2 * np.pi * (np.arange(width) + 0.5) / width
@@ -426,7 +426,7 @@ def panorama(stage: Stage, station: Station, height: int, *, passer_by: bool) ->
     flat = np.cos(elevation)[:, None]
     z = np.broadcast_to(np.sin(elevation)[:, None], (height, width))
     local = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), z], axis=-1).reshape(-1, 3)
-    beams = stage.look(
+    beams = scenery.look(
         station.true.position,
         rotated(local, station.true.rotation),
         passer_by=passer_by,

@@ -23,7 +23,7 @@ from tourgen.simulation.charts import (
     wall_surface,
 )
 from tourgen.simulation.model import Lamp, PlacedOpening, RoomModel
-from tourgen.simulation.rooms import casing
+from tourgen.simulation.rooms import ring_on
 
 RADIUS = 1.10
 NEWEL = 0.20
@@ -183,18 +183,13 @@ def stairs() -> RoomModel:
     for opening in openings:
         charts += reveal(wall, opening, plaster, granite)
         if opening.round:
-            out = wall.outward(opening.s)
-            x, y, _ = wall.point(np.array(opening.s), np.array(0.0))
-            ring = place(casing(opening, oak), at=(-opening.s, 0.0, 0))
-            charts += place(
-                ring, float(np.arctan2(out[1], out[0])) - np.pi / 2, (float(x), float(y), 0.0)
-            )
+            charts += ring_on(wall, opening, oak)
     charts += flight(granite, riser, plaster)
     charts += sector(-(2 * np.pi - CLOSED), 0.0, 0.0, dado)
     charts += revolve(
         [(NEWEL, -0.01), (NEWEL, CLIMB + 1.05)],
         (0, 0, 0),
-        look.stone((170, 160, 148), 0.30, 0.42),
+        look.stone((170, 160, 148), 0.30, 2 * np.pi * NEWEL / 3),
         segments=40,
     )
     charts += revolve(
