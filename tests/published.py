@@ -77,6 +77,13 @@ def rooms_of(site: Path) -> dict[str, dict[str, Any]]:
     return {room["id"]: room for room in tour["rooms"]}
 
 
+def arrival(site: Path, room_id: str) -> dict[str, list[float]]:
+    """The first view of a room for one who comes through a door: position and look_at."""
+    links = (link for room in rooms_of(site).values() for link in room["links"])
+    view: dict[str, list[float]] = next(link["arrive"] for link in links if link["to"] == room_id)
+    return view
+
+
 def tileset(file: Path) -> tuple[dict[str, Any], Node]:
     """The document and its root tile."""
     document = json.loads(file.read_text(encoding="utf-8"))

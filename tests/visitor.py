@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -33,7 +34,7 @@ CHROMIUM = (
 UPRIGHT_DEG = 65.0
 """Vertical field of view of the viewer in a wide window."""
 
-WAIT_MS = 60_000
+WAIT_S = 60
 
 
 @dataclass
@@ -51,7 +52,7 @@ class Visitor:
     faults: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.page.set_default_timeout(WAIT_MS)
+        self.page.set_default_timeout(WAIT_S * 1000)
         self.page.on("console", self._heard)
         self.page.on("pageerror", lambda error: self.faults.append(f"exception: {error}"))
         self.page.on("request", self._asked)
@@ -67,8 +68,14 @@ class Visitor:
         self.wait("window.tourgen?.ready")
 
     def wait(self, condition: str) -> None:
-        """Wait until a JavaScript expression is true."""
-        self.page.wait_for_function(condition)
+        """Wait until a JavaScript expression is true.
+
+        Playwright's own wait evaluates strings in the page, which the published headers forbid.
+        """
+        end = time.monotonic() + WAIT_S
+        while not self.page.evaluate(f"Boolean({condition})"):
+            assert time.monotonic() < end, f"{condition}: still not so after {WAIT_S} s"
+            self.page.wait_for_timeout(20)
 
     def settle(self) -> None:
         """Wait until everything that the view asks for is drawn."""
@@ -118,7 +125,7 @@ class Visitor:
 
     def _heard(self, message: ConsoleMessage) -> None:
         if message.type == "error":
-            self.faults.append(f"console: {message.text}")
+            self.faults.append(f"console: {message.text} ({message.location['url']})")
 
     def _asked(self, request: Request) -> None:
         if not request.url.startswith((f"{self.origin}/", "data:", f"blob:{self.origin}/")):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from playwright.sync_api import Browser
-from published import rooms_of, tileset
+from published import arrival, tileset
 from served import served
 from visitor import UPRIGHT_DEG, Picture, Visit, Visitor, psnr_db, visitor
 
@@ -21,7 +21,9 @@ texture upside down or a wrong colour space stay below 20 dB."""
 
 
 @pytest.fixture(scope="module")
-def cesium(browser: Browser, site: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visitor]:
+def cesium(
+    browser: Browser, site: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Visitor]:
     """A page with CesiumJS beside the published tour."""
     folder = tmp_path_factory.mktemp("cesium")
     tests = Path(__file__).parents[1]
@@ -36,43 +38,43 @@ def cesium(browser: Browser, site: Path, tmp_path_factory: pytest.TempPathFactor
         opened.page.context.close()
 
 
-def draw(cesium: Visitor, room: dict[str, object], error: float) -> tuple[set[str], Picture]:
+def draw(cesium: Visitor, site: Path, room: str, error: float) -> tuple[set[str], Picture]:
     """The tiles that Cesium drew, by name, and its picture."""
-    entry = room["entry"]
+    view = arrival(site, room)
     paths = cesium.page.evaluate(
         "(asked) => window.draw(asked)",
         {
-            "url": f"/site/{room['tileset']}",
-            "position": entry["position"],
-            "lookAt": entry["look_at"],
+            "url": f"/site/rooms/{room}/tileset.json",
+            "position": view["position"],
+            "lookAt": view["look_at"],
             "uprightDeg": UPRIGHT_DEG,
             "error": error,
         },
     )
     png = cesium.page.screenshot(type="png")
-    return {Path(path).name for path in paths}, np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+    return {Path(path).name for path in paths}, np.asarray(
+        Image.open(io.BytesIO(png)).convert("RGB")
+    )
 
 
-@pytest.mark.parametrize("room_id", ROOMS)
-def test_root_is_drawn(cesium: Visitor, site: Path, room_id: str) -> None:
-    room = rooms_of(site)[room_id]
-    _, root = tileset(site / room["tileset"])
-    drawn, _ = draw(cesium, room, 1e9)
+@pytest.mark.parametrize("room", ROOMS)
+def test_root_is_drawn(cesium: Visitor, site: Path, room: str) -> None:
+    _, root = tileset(site / "rooms" / room / "tileset.json")
+    drawn, _ = draw(cesium, site, room, 1e9)
     assert drawn == {root.file.name}
     assert cesium.faults == []
 
 
-@pytest.mark.parametrize("room_id", ROOMS)
+@pytest.mark.parametrize("room", ROOMS)
 def test_leaves_are_drawn_as_the_viewer_draws_them(
-    cesium: Visitor, visit: Visit, site: Path, room_id: str
+    cesium: Visitor, visit: Visit, site: Path, room: str
 ) -> None:
-    room = rooms_of(site)[room_id]
-    _, root = tileset(site / room["tileset"])
-    drawn, theirs = draw(cesium, room, 0.0)
+    _, root = tileset(site / "rooms" / room / "tileset.json")
+    drawn, theirs = draw(cesium, site, room, 0.0)
     assert drawn
     assert drawn <= {leaf.file.name for leaf in root.leaves()}
     assert cesium.faults == []
     own = visit()
-    own.open(f"rooms/{room_id}/index.html", levels="leaves")
-    own.teleport(room["entry"]["position"], room["entry"]["look_at"])
+    own.open(f"rooms/{room}/index.html", levels="leaves")
+    own.teleport(**arrival(site, room))
     assert psnr_db(own.picture(), theirs) > ALIKE_DB

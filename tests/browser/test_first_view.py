@@ -6,7 +6,7 @@ import gzip
 import json
 from pathlib import Path
 
-from published import rooms_of, surface, tileset
+from published import arrival, rooms_of, surface, tileset
 from visitor import Visit, psnr_db
 
 FIRST_VIEW_BYTES = 200_000
@@ -24,12 +24,11 @@ def test_the_first_view_is_small_and_full(site: Path) -> None:
 
 
 def test_the_first_view_looks_like_the_finest(site: Path, visit: Visit) -> None:
-    entry = rooms_of(site)["chamber1"]["entry"]
     pictures = []
     for levels in ("root", "leaves"):
         here = visit()
         here.open("rooms/chamber1/index.html", levels=levels)
-        here.teleport(entry["position"], entry["look_at"])
+        here.teleport(**arrival(site, "chamber1"))
         pictures.append(here.picture())
     assert psnr_db(*pictures) >= FIRST_VIEW_DB
 
@@ -42,7 +41,9 @@ def test_the_script_is_small(site: Path) -> None:
 
 
 def test_the_report_tells_the_first_view(site: Path) -> None:
-    room = rooms_of(site)["chamber1"]
-    _, root = tileset(site / room["tileset"])
-    first = (site / room["tileset"]).stat().st_size + root.file.stat().st_size
-    assert json.loads((site / "report.json").read_text())["first_view_bytes"] == first
+    first = []
+    for room in rooms_of(site).values():
+        _, root = tileset(site / room["tileset"])
+        first.append((site / room["tileset"]).stat().st_size + root.file.stat().st_size)
+    report = json.loads((site / "report.json").read_text(encoding="utf-8"))
+    assert report["first_view_bytes"] == max(first)

@@ -1,0 +1,110 @@
+"""No hole shows where tiles of different levels meet.
+
+Levels are forced into a checkerboard of neighbours and the void is coloured magenta: what shines
+through, outside the true openings of the room, is a hole. The true openings are known from the
+simulator's ground truth, which tests may open and the pipeline may not.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import open3d as o3d
+import pytest
+from scipy.ndimage import binary_dilation
+from visitor import Picture, Vector, Visit, rays
+
+ROOMS = ("chamber1", "stairs", "chamber2")
+VIEWS = 50
+SIZE = (480, 320)
+CLEARANCE_M = 0.35
+EYE_M = 1.6
+VOID = "ff00ff"
+EXCESS = 60
+"""How much a pixel's red and blue exceed its green when a quarter of it is void; nothing in the
+rooms comes near."""
+RIM_PX = 4
+"""Around a true opening, where the surface may end a few millimetres sooner or later."""
+FLAT_LUMINANCE = 8.0
+"""Standard deviation, of 255, below which a picture shows nothing."""
+
+Bools = npt.NDArray[np.bool_]
+
+
+class TruthRoom:
+    """The room as it stands."""
+
+    def __init__(self, file: Path) -> None:
+        mesh = o3d.t.geometry.TriangleMesh.from_legacy(o3d.io.read_triangle_mesh(str(file)))
+        self.scene = o3d.t.geometry.RaycastingScene()
+        self.scene.add_triangles(mesh)
+        self.low = mesh.get_min_bound().numpy()
+        self.high = mesh.get_max_bound().numpy()
+
+    def views(self, count: int) -> list[tuple[Vector, Vector]]:
+        """Places where one can stand, each with a direction to look."""
+        rng = np.random.default_rng(7)
+        found: list[tuple[Vector, Vector]] = []
+        while len(found) < count:
+            eye = rng.uniform(self.low, self.high)
+            down = self.cast(eye, np.array([0.0, 0.0, -1.0]))
+            eye[2] += EYE_M - down
+            if not np.isfinite(down) or self.clearance(eye) < CLEARANCE_M or not self.inside(eye):
+                continue
+            turn, tilt = rng.uniform(0, 2 * np.pi), rng.uniform(-0.7, 0.5)
+            ahead = [np.cos(turn) * np.cos(tilt), np.sin(turn) * np.cos(tilt), np.sin(tilt)]
+            found.append((eye, eye + ahead))
+        return found
+
+    def cast(self, origin: Vector, direction: Vector) -> float:
+        """Distance to the first surface, infinite where there is none."""
+        ray = np.concatenate([origin, direction]).astype(np.float32)[None]
+        return float(self.scene.cast_rays(o3d.core.Tensor(ray))["t_hit"].numpy()[0])
+
+    def clearance(self, place: Vector) -> float:
+        point = o3d.core.Tensor(place.astype(np.float32)[None])
+        return float(self.scene.compute_distance(point).numpy()[0])
+
+    def inside(self, place: Vector) -> bool:
+        """Whether nearly all directions end on a surface of the room."""
+        directions = np.random.default_rng(1).normal(size=(200, 3))
+        cast = np.concatenate([np.broadcast_to(place, directions.shape), directions], axis=1)
+        hits = self.scene.cast_rays(o3d.core.Tensor(cast.astype(np.float32)))["t_hit"].numpy()
+        return bool(np.isfinite(hits).mean() > 0.75)
+
+    def openings(self, eye: Vector, look_at: Vector) -> Bools:
+        """The pixels through which one looks out of the room."""
+        cast = rays(eye, look_at, SIZE)
+        return ~np.isfinite(self.scene.cast_rays(o3d.core.Tensor(cast))["t_hit"].numpy())
+
+
+def void(picture: Picture) -> Bools:
+    """The pixels through which the background shines."""
+    red, green, blue = np.moveaxis(picture.astype(np.int16), 2, 0)
+    shines: Bools = np.minimum(red, blue) - green > EXCESS
+    return shines
+
+
+def holes(truth: TruthRoom, picture: Picture, eye: Vector, look_at: Vector) -> int:
+    """Pixels of void that are no true opening."""
+    rim = np.ones((2 * RIM_PX + 1, 2 * RIM_PX + 1), np.bool_)
+    allowed = binary_dilation(truth.openings(eye, look_at), rim)
+    return int((void(picture) & ~allowed).sum())
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_no_hole_where_levels_meet(tour_folder: Path, visit: Visit, room: str) -> None:
+    truth = TruthRoom(tour_folder / "truth" / f"{room}.ply")
+    here = visit(size=SIZE)
+    here.open(f"rooms/{room}/index.html", levels="checkerboard", background=VOID)
+    told, flat = [], []
+    for number, (eye, look_at) in enumerate(truth.views(VIEWS)):
+        here.teleport(eye.tolist(), look_at.tolist())
+        picture = here.picture()
+        if count := holes(truth, picture, eye, look_at):
+            told.append((number, count))
+        if picture.mean(axis=2).std() < FLAT_LUMINANCE:
+            flat.append(number)
+    assert (told, flat) == ([], [])
