@@ -7,7 +7,9 @@ simulator's ground truth, which tests may open and the pipeline may not.
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -36,8 +38,11 @@ Bools = npt.NDArray[np.bool_]
 class TruthRoom:
     """The room as it stands."""
 
-    def __init__(self, file: Path) -> None:
-        mesh = o3d.t.geometry.TriangleMesh.from_legacy(o3d.io.read_triangle_mesh(str(file)))
+    def __init__(self, folder: Path, room: str) -> None:
+        read = o3d.io.read_triangle_mesh(str(folder / f"{room}.ply"))
+        mesh = o3d.t.geometry.TriangleMesh.from_legacy(read)
+        facts = json.loads((folder / f"{room}.json").read_text(encoding="utf-8"))
+        self.doors_and_windows = facts["openings"]
         self.scene = o3d.t.geometry.RaycastingScene()
         self.scene.add_triangles(mesh)
         self.low = mesh.get_min_bound().numpy()
@@ -75,9 +80,30 @@ class TruthRoom:
         return bool(np.isfinite(hits).mean() > 0.75)
 
     def openings(self, eye: Vector, look_at: Vector) -> Bools:
-        """The pixels through which one looks out of the room."""
+        """The pixels through which one looks out of the room, or into the depth of a doorway."""
         cast = rays(eye, look_at, SIZE)
-        return ~np.isfinite(self.scene.cast_rays(o3d.core.Tensor(cast))["t_hit"].numpy())
+        hit = self.scene.cast_rays(o3d.core.Tensor(cast))["t_hit"].numpy()
+        out = ~np.isfinite(hit)
+        for opening in self.doors_and_windows:
+            out |= through(opening, cast, hit)
+        return out
+
+
+def through(opening: dict[str, Any], cast: npt.NDArray[np.float32], hit: Vector) -> Bools:
+    """Whether rays pass an opening's rim in the plane of the wall before they meet anything."""
+    centre, right, up, outward = (
+        np.array(opening[key]) for key in ("center", "right", "up", "outward")
+    )
+    centre = centre - outward * opening["depth"]
+    origin, direction = cast[..., :3].astype(np.float64), cast[..., 3:].astype(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = (centre - origin) @ outward / (direction @ outward)
+        at = origin + reach[..., None] * direction - centre
+    beside = np.abs(at @ right) / (opening["width"] / 2)
+    above = np.abs(at @ up) / (opening["height"] / 2)
+    rim = np.hypot(beside, above) if opening["kind"] == "porthole" else np.maximum(beside, above)
+    passed: Bools = (rim <= 1) & (reach > 0) & (direction @ outward > 0) & (reach < hit)
+    return passed
 
 
 def void(picture: Picture) -> Bools:
@@ -96,7 +122,7 @@ def holes(truth: TruthRoom, picture: Picture, eye: Vector, look_at: Vector) -> i
 
 @pytest.mark.parametrize("room", ROOMS)
 def test_no_hole_where_levels_meet(tour_folder: Path, visit: Visit, room: str) -> None:
-    truth = TruthRoom(tour_folder / "truth" / f"{room}.ply")
+    truth = TruthRoom(tour_folder / "truth", room)
     here = visit(size=SIZE)
     here.open(f"rooms/{room}/index.html", levels="checkerboard", background=VOID)
     told, flat = [], []
