@@ -18,7 +18,7 @@ from tourgen.pipeline import RoomRecipe, RoomResult, planned, tour_recipes
 from tourgen.progress import Listener
 from tourgen.report import tour_report
 from tourgen.site import BuiltRoom, write_site
-from tourgen.tour import Link, Tour, Viewpoint, check_scans
+from tourgen.tour import Link, Tour, Viewpoint
 from tourgen.workers import build_rooms, cores
 
 _POSTER_QUALITY = 82
@@ -72,11 +72,10 @@ def build_tour(
         The report.
 
     Raises:
-        InputError: A scan or ``only`` cannot be used.
+        InputError: ``only`` cannot be used, or the output folder.
         RoomsFailed: Rooms could not be built.
     """
     started = time.perf_counter()
-    check_scans(tour)
     cache = Cache(tour.folder)
     recipes = tour_recipes(tour, cache)
     _require_built(recipes, [tour.room(room_id).id for room_id in only], cache)

@@ -107,11 +107,10 @@ def _new(asked: argparse.Namespace) -> int:
 
 
 def _check(asked: argparse.Namespace) -> int:
-    from tourgen.tour import check_scans, load_tour
+    from tourgen.tour import check_tour
 
     try:
-        tour = load_tour(asked.folder)
-        warnings = check_scans(tour)
+        tour, warnings = check_tour(asked.folder)
     except Faults as faults:
         if not asked.json:
             raise
@@ -128,10 +127,9 @@ def _check(asked: argparse.Namespace) -> int:
 
 def _plan(asked: argparse.Namespace) -> int:
     from tourgen.build import plan_tour
-    from tourgen.tour import check_scans, load_tour
+    from tourgen.tour import check_tour
 
-    tour = load_tour(asked.folder)
-    check_scans(tour)
+    tour, _ = check_tour(asked.folder)
     rooms = plan_tour(tour)
     if asked.json:
         _print_json({room.room: dict(room.stages) for room in rooms})
@@ -147,9 +145,9 @@ def _plan(asked: argparse.Namespace) -> int:
 def _build(asked: argparse.Namespace) -> int:
     from tourgen.build import build_tour
     from tourgen.progress import ProgressBars
-    from tourgen.tour import load_tour
+    from tourgen.tour import check_tour
 
-    tour = load_tour(asked.folder)
+    tour, _ = check_tour(asked.folder)
     out = asked.output or asked.folder / OUTPUT
     with ProgressBars() as bars:
         report = build_tour(tour, out, bars, only=asked.room, jobs=asked.jobs)

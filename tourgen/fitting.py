@@ -183,8 +183,8 @@ def entering(start: Viewpoint | None) -> Entering:
     return Entering(start.position, start.look_at) if start else Entering(None, None)
 
 
-def read(room: Room, folder: Path) -> RoomScan:
-    """Read a room's scans."""
+def read(room: Room, folder: Path, _: Reading) -> RoomScan:
+    """Read a room's scans; the settings are those of the room, gathered for the key."""
     scans = open_scans(room, folder)
     cloud, found, facts = read_room(scans, room.keep, room.remove, room.clean.min_points)
     if room.stations == "auto":

@@ -1,7 +1,8 @@
 """Entry: where a visitor first stands in a room, and what they look at.
 
-Of the places where scanners stood (or, failing those, a grid over the floor) the one with the
-longest open view wins; the visitor looks along it. Eyes are at 1.6 m above the floor found below.
+Of the places where scanners stood (failing those, of a grid over the room) the one with the
+longest open view wins; the visitor looks along it. The eye is 1.6 m above the floor below, and
+that floor is near the room's lowest: nobody enters on top of a wardrobe.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from tourgen.geometry import Float64, Mesh, View
 
 VERSION = 1
+_STEP_M = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,25 +44,23 @@ def entry_view(mesh: Mesh, stations: Float64, settings: Settings) -> View:
 
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(mesh.vertices, mesh.faces.astype(np.uint32))
-    places = np.concatenate([stations, _floor_grid(mesh)])
+    places = stations if len(stations) else _grid(mesh)
     eyes = _eyes(scene, places, settings.eye_m)
+    lowest_m = np.nanmin(np.where(np.isfinite(eyes[:, 2]), eyes[:, 2], np.nan))
     azimuth = np.radians(np.arange(0, 360, 5.0))
     heading = np.stack([np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)], axis=1)
-    best_score, best = -np.inf, View(np.array([0, 0, settings.eye_m]), np.array([1, 0, 1.5]))
-    for rank, eye in enumerate(eyes):
+    width = int(settings.fan_deg / 5) // 2
+    best_m, best = -np.inf, View(eyes[0], eyes[0] + heading[0])
+    for eye in eyes[eyes[:, 2] < lowest_m + _STEP_M]:
         depth = np.minimum(_cast(scene, np.broadcast_to(eye, heading.shape), heading), 20.0)
-        if not np.all(np.isfinite(eye)) or depth.min() < settings.clearance_m:
-            continue
-        width = int(settings.fan_deg / 5) // 2
         seen = np.mean([np.roll(depth, k) for k in range(-width, width + 1)], axis=0)
-        score = float(seen.max()) + (0.5 if rank < len(stations) else 0.0)
-        if score > best_score:
+        if depth.min() > settings.clearance_m and seen.max() > best_m:
             ahead = heading[int(np.argmax(seen))]
-            best_score, best = score, View(eye, eye + 2 * ahead - np.array([0, 0, 0.2]))
+            best_m, best = seen.max(), View(eye, eye + 2 * ahead - np.array([0, 0, 0.2]))
     return best
 
 
-def _floor_grid(mesh: Mesh) -> Float64:
+def _grid(mesh: Mesh) -> Float64:
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     x, y = (np.linspace(low[i], high[i], 12)[1:-1] for i in range(2))
     z = low[2] + min(1.5, (high[2] - low[2]) / 2)

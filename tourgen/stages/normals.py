@@ -37,7 +37,7 @@ class Settings:
     """
 
     neighbours: int = 16
-    sight_cell_deg: float = 1.0
+    sight_cell_deg: float = 0.5
     tree_points: int = 40_000
 
 
@@ -84,7 +84,8 @@ def _look_at_seeing(
     for station in stations:
         ray = station.astype(np.float32) - points
         cosine = np.einsum("ij,ij->i", normal, ray) / np.maximum(np.linalg.norm(ray, axis=1), 1e-6)
-        cosine[~depth_buffer(points, station, cell_deg).sees(points)] = 0
+        np.clip(cosine, -1, 1, out=cosine)
+        cosine[~depth_buffer(points, station, cell_deg).sees(points, cosine)] = 0
         best = np.where(np.abs(cosine) > np.abs(best), cosine, best)
     normal[best < 0] *= -1
     return np.asarray(np.abs(best) > 0.05)

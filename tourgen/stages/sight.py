@@ -34,10 +34,21 @@ class DepthBuffer:
         """Flat cell index, range and elevation in degrees of each of (n, 3) points."""
         return _directions(points, self.station, self.cell_deg)
 
-    def sees(self, points: Float32, tolerance: float = 0.03) -> npt.NDArray[np.bool_]:
-        """Mask of the (n, 3) points with nothing in front of them."""
+    def sees(
+        self, points: Float32, cosine: Float32, margin_m: float = 0.02
+    ) -> npt.NDArray[np.bool_]:
+        """Mask of the (n, 3) points with nothing in front of them.
+
+        Args:
+            points: Metres.
+            cosine: (n,) of the angle between the ray and the surface's normal: within one cell a
+                slanted surface spans a depth of its own, which is not in front of it.
+            margin_m: How much nearer something must be to count as in front.
+        """
         cell, distance, _ = self.cells(points)
-        return np.asarray(distance <= self.range_m.reshape(-1)[cell] * (1 + tolerance) + 0.02)
+        slant = np.minimum(np.sqrt(1 - cosine**2) / np.maximum(np.abs(cosine), 1e-3), 8.0)
+        span_m = distance * np.float32(np.radians(self.cell_deg)) * slant
+        return np.asarray(distance - span_m - margin_m <= self.range_m.reshape(-1)[cell])
 
     def looks_through(
         self, points: Float32, lowest_deg: float, margin_m: float
