@@ -288,3 +288,24 @@ def test_the_stair_can_be_climbed() -> None:
         assert head.min() >= 1.9
         assert fall.max() <= 0.301
         assert fall.min() >= 0.299 - stairs.RISE  # the nosing of the next step, at most
+
+
+def test_the_stations_see_the_stair() -> None:
+    model = MODELS["stairs"]()
+    mesh = mesh_of(model)
+    scene = ray_scene(mesh.vertices, mesh.faces)
+    rng = np.random.default_rng(2)
+    step = rng.integers(0, stairs.RISERS - 1, 4000)
+    turn = np.pi + 0.5 + (step + rng.random(4000)) * stairs.TREAD
+    radius = np.sqrt(rng.uniform(0.25**2, 1.0, 4000))
+    height = (step + 1) * stairs.RISE + 0.003
+    treads = np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)
+    seen = np.zeros(4000, dtype=np.bool_)
+    for station in model.stations:
+        way = treads - station
+        length = np.linalg.norm(way, axis=1)
+        direction = way / length[:, None]
+        rays = rays_of(np.broadcast_to(station, way.shape), direction)
+        free = scene.cast_rays(rays)["t_hit"].numpy() > length - 0.006
+        seen |= free & (direction[:, 2] > -np.sin(np.radians(60)))
+    assert seen.mean() > 0.9
