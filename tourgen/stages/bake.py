@@ -41,6 +41,7 @@ Int64 = npt.NDArray[np.int64]
 _TOUCH = 0.71  # half a texel's diagonal: any texel touched at all
 _LEAF_POINTS = 24
 _LARGEST_CELL_M = 0.5
+_FEWER = 0.7
 _TEXELS_AT_ONCE = 100_000
 _CELL_OF_TEXEL = 0.75  # a level's cells are at most so large
 _SIGMA_OF_SPACING = 0.45  # narrow enough for letters a few points wide
@@ -116,17 +117,20 @@ def color_index(cloud: PointCloud, oriented: OrientedCloud, finest_texel_m: floa
     )
     nearest = cKDTree(oriented.cloud.points, leafsize=_LEAF_POINTS).query(points)[1]
     normals = oriented.normals[nearest]
-    levels = []
-    while True:
-        tree = cKDTree(points, leafsize=_LEAF_POINTS, balanced_tree=False, compact_nodes=True)
-        levels.append(_Level(cell_m, tree, points, normals, _bytes(colors)))
-        if cell_m >= _LARGEST_CELL_M:
-            return ColorIndex(tuple(levels))
+    levels = [_level(cell_m, points, normals, colors)]
+    while cell_m < _LARGEST_CELL_M:
         cell_m *= 2
-        points, normals, colors = _averaged(
-            points, _facing(normals), cell_m, points, normals, colors
-        )
-        normals = _unit(normals)
+        fewer = _averaged(points, _facing(normals), cell_m, points, normals, colors)
+        if len(fewer[0]) > _FEWER * len(points) and cell_m < _LARGEST_CELL_M:
+            continue  # these cells hold about one point each: the finer level tells as much
+        points, normals, colors = fewer[0], _unit(fewer[1]), fewer[2]
+        levels.append(_level(cell_m, points, normals, colors))
+    return ColorIndex(tuple(levels))
+
+
+def _level(cell_m: float, points: Float32, normals: Float32, colors: Float32) -> _Level:
+    tree = cKDTree(points, leafsize=_LEAF_POINTS, balanced_tree=False)
+    return _Level(cell_m, tree, points, normals, _bytes(colors))
 
 
 def _averaged(
