@@ -9,7 +9,7 @@ import numpy.typing as npt
 from scan_files import cloud_table, write_ply
 
 WIDTH_M, DEPTH_M, HEIGHT_M = 3.0, 2.4, 2.4
-POINTS = 60_000
+POINTS = 30_000
 
 TOUR = """\
 [tour]
@@ -19,6 +19,7 @@ languages = ["en", "fr"]
 [[room]]
 id = "left"
 scans = ["scans/left.ply"]
+stations = [[0.3, 0.2, 1.5]]
 [room.surface]
 detail_mm = 30
 [room.texture]
@@ -30,6 +31,7 @@ at = [1.4, 0.0, 1.0]
 [[room]]
 id = "right"
 scans = ["scans/right.ply"]
+stations = [[0.3, 0.2, 1.5]]
 [room.surface]
 detail_mm = 30
 [room.texture]

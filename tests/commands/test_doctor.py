@@ -1,0 +1,45 @@
+"""What the doctor finds lacking, and how it says so."""
+
+from __future__ import annotations
+
+import ctypes
+from pathlib import Path
+
+import pytest
+
+from tourgen import doctor
+
+
+def test_a_whole_machine_lacks_nothing(tmp_path: Path) -> None:
+    assert doctor.findings(tmp_path, tests=True) == []
+
+
+def test_a_missing_library_is_told_with_its_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def load(name: str) -> None:
+        if name == "libusb-1.0.so.0":
+            raise OSError(f"{name}: cannot open shared object file")
+
+    monkeypatch.setattr(ctypes, "CDLL", load)
+    monkeypatch.setattr(doctor.sys, "platform", "linux")
+    (finding,) = doctor.findings(tmp_path)
+    assert finding.subject == "libusb-1.0.so.0"
+    assert finding.package == "libusb-1.0-0"
+    assert "libusb-1.0-0" in finding.mend or finding.subject in finding.mend
+
+
+def test_a_missing_browser_matters_to_tests_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert doctor.findings(tmp_path) == []
+    (finding,) = doctor.findings(tmp_path, tests=True)
+    assert finding.package == "chromium"
+
+
+def test_a_full_disk_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "DISK_NEEDED", 1 << 60)
+    (finding,) = doctor.findings(tmp_path)
+    assert "GiB free" in finding.fault
+    assert "tourgen clean" in finding.mend
