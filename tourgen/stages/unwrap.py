@@ -58,6 +58,7 @@ _LEAST_AREA = 0.1  # of a face, as drawn, for a crumb to stay joined
 _HALVE_GAIN = 0.8  # two boxes, as a share of the one that they replace
 _ANGLES = np.radians(np.arange(0.0, 90.0, 3.0))
 _TOUCH = 0.71  # half a texel's diagonal: any texel touched at all
+_EDGE = 1e-3  # share of a corner below which a place counts as on the edge
 _MAX_TEXTURE = 4096
 _COARSER = 1.2
 _WIDTHS = (0.55, 0.7, 0.85, 1.0, 1.15, 1.35)  # of the side of a square that all charts would fill
@@ -96,8 +97,16 @@ def unwrap(mesh: Mesh, settings: Settings) -> UvMesh:
     if not len(mesh.faces):
         raise StageError("unwrap: expected a tile of at least 1 face, found 0")
     topology = _topology(mesh)
-    chart = _segment(topology, settings)
-    return _pack(mesh, _charts(mesh, topology, chart, settings), settings)
+    charts = _charts(mesh, topology, _segment(topology, settings), settings)
+    while True:
+        unwrapped = _pack(mesh, charts, settings)
+        width, height = unwrapped.texture_size
+        corners = unwrapped.uv.astype(np.float64)[unwrapped.mesh.faces] * (width, height)
+        twice = _on_another(corners, width, height)
+        if not twice.any():
+            return unwrapped
+        cut = _components(topology, _cut(mesh, topology, charts.chart, twice))
+        charts = _unfolded(mesh, topology, cut, settings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -549,24 +558,28 @@ def _untangle(flat: Float64, faces: Int64) -> Float64:
 def _folded(flat: Float64, faces: Int64, chart: Int64, vertex_chart: Int64, texel_m: float) -> Bool:
     """(f,) faces that lie on another face of their chart, or upside down.
 
-    Charts are rasterised apart from one another, at a texel or a third of an edge.
+    Charts are rasterised apart from one another.
     """
-    areas = _signed_areas(flat, faces)
-    bad: Bool = areas < 0
-    step = max(texel_m, float(np.sqrt(2 * np.abs(areas).mean())) / 3, 1e-6)
     low, high = _boxes(flat, vertex_chart, int(chart.max()) + 1)
-    heights = np.ceil((high - low)[:, 1] / step).astype(np.int64) + 2
+    heights = np.ceil((high - low)[:, 1] / texel_m).astype(np.int64) + 2
     tops = np.cumsum(heights) - heights
-    at = (flat - low[vertex_chart]) / step + 1
+    at = (flat - low[vertex_chart]) / texel_m + 1
     at[:, 1] += tops[vertex_chart]
-    width = int(np.ceil((high - low)[:, 0].max() / step)) + 3
-    hits = rasterize(at[faces], width, int(heights.sum()))
+    width = int(np.ceil((high - low)[:, 0].max() / texel_m)) + 3
+    upside_down: Bool = _signed_areas(flat, faces) < 0
+    return upside_down | _on_another(at[faces], width, int(heights.sum()))
+
+
+def _on_another(corners: Float64, width: int, height: int) -> Bool:
+    """(f,) faces that cover the centre of a texel which another face covers too."""
+    hits = rasterize(corners, width, height)
     # A centre on a common edge belongs to both of its faces, and is no overlap.
-    deep = hits.barycentric.min(1) > 1e-3
+    deep = hits.barycentric.min(1) > _EDGE
     key = hits.row[deep].astype(np.int64) * width + hits.column[deep]
     order = np.argsort(key, kind="stable")
     twice = np.flatnonzero(np.diff(key[order]) == 0)
     found = hits.face[deep][order]
+    bad = np.zeros(len(corners), bool)
     bad[found[twice]] = True
     bad[found[twice + 1]] = True
     return bad
