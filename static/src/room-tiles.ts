@@ -52,6 +52,7 @@ export function tileDecoder(decoderFolder: URL): LoadingManager {
 export class RoomTiles {
   readonly #tiles: TilesRenderer;
   readonly #events: RoomEvents;
+  readonly #pruned = new Map<Tile, Tile[]>();
   #stale = true;
   #rootShown = false;
   #bytes = 0;
@@ -79,7 +80,7 @@ export class RoomTiles {
     tiles.addEventListener("tile-visibility-change", () => events.changed());
     tiles.addEventListener("load-model", ({ scene, tile }) => this.#loaded(scene, tile));
     tiles.addEventListener("load-error", ({ tile }) => {
-      if (tile?.parent) events.partFailed();
+      if (tile?.parent) this.#standIn(tile.parent);
       else events.failed();
       this.#touch();
     });
@@ -118,12 +119,24 @@ export class RoomTiles {
   }
 
   retry(): void {
+    for (const [tile, children] of this.#pruned) tile.children = children;
+    this.#pruned.clear();
     this.#tiles.resetFailedTiles();
     this.#touch();
   }
 
   dispose(): void {
     this.#tiles.dispose();
+  }
+
+  /**
+   * Keeps a tile on screen one of whose children is missing: the renderer would rather show a hole.
+   * Children come on screen all at once, so at this time none of them is.
+   */
+  #standIn(tile: Tile): void {
+    if (tile.children?.length) this.#pruned.set(tile, tile.children);
+    tile.children = [];
+    this.#events.partFailed();
   }
 
   #touch(): void {

@@ -3,8 +3,10 @@
  *
  * The capsule hangs a step's height above the floor, so that risers pass under it; rays from
  * that height find the floor, and the feet are set on it at once while the eye follows smoothly.
- * There is no free fall: a step off an edge deeper than `DROP_M` is refused like a wall, and over
- * a hole in the scan, where there is nothing below at all, the visitor keeps the height.
+ * There is no free fall: a step off an edge deeper than `DROP_M` is refused like a wall, and so is
+ * a step into the void through a door or a hole in a wall. A hole in the floor, as below a scanner,
+ * or a missing tread is told from these by floor on both sides of it, and is crossed as if a board
+ * lay over it.
  */
 
 import { Vector3 } from "three";
@@ -23,9 +25,17 @@ const STRIDE_M = 0.04;
 /** Feet are felt for around the middle too, so that a gap or a grating does not swallow them. */
 const FOOT_RING_M = 0.12;
 const FOOT_RING = [0, 1, 2, 3, 4, 5].map((i) => (i * Math.PI) / 3);
+/** Boards over holes: short ones as steep as a stair, whatever is below; long level ones over the void. */
+const SHORT_BOARD = { steepness: 0.9, radiiM: [0.2, 0.4, 0.6, 0.8] };
+const LONG_BOARD = { steepness: 0, radiiM: [0.2, 0.4, 0.8, 1.2, 1.6, 2] };
+/** A floor less deep below than this makes a pit of a hole. */
+const PIT_M = 2;
+const HALF_RING = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => (i * Math.PI) / 8);
 /** Ways round an obstacle, tried in turn when straight ahead is an edge. */
 const DETOURS = [0, 0.7, -0.7, 1.3, -1.3];
 const EYE_RATE = 11;
+
+type Board = typeof SHORT_BOARD;
 
 export interface Bounds {
   readonly min: Triple;
@@ -39,6 +49,8 @@ export class Walker {
   readonly #bounds: Bounds;
   readonly #strideM: number;
   #height = EYE_M;
+  /** Whether a floor was ever found; until then, anywhere goes. */
+  #grounded = false;
 
   /** @param strideM What is walked without looking, less than a body's radius. */
   constructor(collider: Collider, bounds: Bounds, strideM = STRIDE_M) {
@@ -54,6 +66,7 @@ export class Walker {
     const floor =
       near ?? this.#collider.heightBelow(eye.x, eye.y, eye.z, eye.z - this.#bounds.min[2] + 1);
     if (floor !== null) this.feet.z = floor;
+    this.#grounded = floor !== null;
     this.#clamp(this.feet);
     this.#measureHeadroom();
     this.eye.set(this.feet.x, this.feet.y, this.feet.z + this.#height);
@@ -62,6 +75,7 @@ export class Walker {
   /** Puts the eye at a point in mid-air, until the next stride. */
   hover(eye: Vector3): void {
     this.#height = EYE_M;
+    this.#grounded = false;
     this.eye.copy(eye);
     this.feet.set(eye.x, eye.y, eye.z - EYE_M);
   }
@@ -119,8 +133,10 @@ export class Walker {
       const to = new Vector3(x, y, from.z);
       this.#clamp(to);
       const floor = this.#floorNear(to);
-      if (floor === null && this.#isEdge(to)) continue;
-      if (floor !== null) to.z = floor;
+      const board = floor === null && this.#grounded ? this.#boardOver(to) : null;
+      if (floor === null && board === null && this.#grounded) continue;
+      to.z = floor ?? board ?? to.z;
+      this.#grounded ||= floor !== null;
       const gone = Math.hypot(to.x - from.x, to.y - from.y);
       from.copy(to);
       return gone > 1e-5;
@@ -142,9 +158,37 @@ export class Walker {
     return floor;
   }
 
-  /** Whether there is a floor below, only too far down. */
-  #isEdge(feet: Vector3): boolean {
-    return this.#collider.heightBelow(feet.x, feet.y, feet.z) !== null;
+  /** Height of a board over the hole that the feet are above, or null where it is no hole. */
+  #boardOver(feet: Vector3): number | null {
+    const pit = this.#collider.heightBelow(feet.x, feet.y, feet.z, PIT_M) !== null;
+    return this.#layBoard(feet, SHORT_BOARD) ?? (pit ? null : this.#layBoard(feet, LONG_BOARD));
+  }
+
+  #layBoard(feet: Vector3, board: Board): number | null {
+    for (const angle of HALF_RING) {
+      const here = this.#floorToward(feet, angle, board);
+      const there = here && this.#floorToward(feet, angle + Math.PI, board);
+      if (!there) continue;
+      const z = (here.z * there.radius + there.z * here.radius) / (here.radius + there.radius);
+      if (Math.abs(z - feet.z) <= STEP_M) return z;
+    }
+    return null;
+  }
+
+  /** The nearest floor in a direction that such a board would lie on. */
+  #floorToward(
+    feet: Vector3,
+    angle: number,
+    { steepness, radiiM }: Board,
+  ): { radius: number; z: number } | null {
+    for (const radius of radiiM) {
+      const reach = STEP_M + steepness * radius;
+      const x = feet.x + radius * Math.cos(angle);
+      const y = feet.y + radius * Math.sin(angle);
+      const z = this.#collider.heightBelow(x, y, feet.z + reach, 2 * reach);
+      if (z !== null) return { radius, z };
+    }
+    return null;
   }
 
   /** Ducks under what is low. */

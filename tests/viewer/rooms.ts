@@ -53,8 +53,12 @@ const STEPS_A_TURN = 14;
 /** No more, or the landing hangs too low over the steps below it. */
 const LANDING_STEPS = 3;
 
-/** A spiral stair in a shaft 2.2 m wide: `steps` treads, counter-clockwise from +x, then a landing. */
-export function spiral(steps: number, rise: number): Shape {
+/**
+ * A spiral stair in a shaft 2.2 m wide: treads counter-clockwise from +x, then a landing.
+ *
+ * @param missing Numbers of treads that no scanner saw.
+ */
+export function spiral(steps: number, rise: number, missing: readonly number[] = []): Shape {
   const shape = new Shape();
   const height = steps * rise + 3;
   const at = (turn: number, radius: number, z: number): Point => [
@@ -71,6 +75,7 @@ export function spiral(steps: number, rise: number): Shape {
     shape.quad([0, 0, 0], at(a, STAIR_RADIUS_M, 0), at(b, STAIR_RADIUS_M, 0), [0, 0, 0]);
   }
   for (let k = 1; k <= steps + LANDING_STEPS; k++) {
+    if (missing.includes(k)) continue;
     const [a, b] = [k * step, (k + 1) * step];
     const top = Math.min(k, steps) * rise;
     const below = top - rise - 0.05;

@@ -98,15 +98,34 @@ test("stays on a platform whose edge is deeper than a step, and on the edge slid
   assert.ok(walker.feet.y > 0.3, `expected to slide along the edge, found y = ${walker.feet.y}`);
 });
 
-test("keeps its height over a hole in the scan, and stays inside the bounds", () => {
-  const shape = new Shape().floor(-3, -3, -1, 3, 0).floor(1, -3, 3, 3, 0);
+test("crosses a hole in the floor at the same height", () => {
+  const shape = new Shape().floor(-3, -3, -0.85, 3, 0).floor(0.85, -3, 3, 3, 0);
   const walker = standing(shape.collider(), -2, 0);
-  walk(walker, 1.5, 0, 1.5);
-  near(walker.feet.x, 0.25, 0.1);
+  walk(walker, 1.5, 0, 1.4);
+  near(walker.feet.x, 0.1, 0.1);
   near(walker.feet.z, 0, 1e-6);
   walk(walker, 1.5, 0, 10);
   near(walker.feet.x, 3, 1e-6);
   near(walker.feet.z, 0, 1e-6);
+});
+
+test("does not leave through a door or a hole in a wall into the void", () => {
+  const shape = new Shape().floor(-3, -3, 1, 3, 0).wall(1, -3, 1, -0.6, 0, 3).wall(1, 0.6, 1, 3, 0, 3);
+  const walker = standing(shape.collider(), 0, 0);
+  walk(walker, 1.5, 0, 4);
+  near(walker.feet.x, 1.06, 0.07);
+  near(walker.feet.z, 0, 1e-6);
+  walk(walker, -1.5, 0, 1);
+  assert.ok(walker.feet.x < -0.3, "and can turn back");
+});
+
+test("floats where no floor was scanned at all, inside the bounds", () => {
+  const shape = new Shape().wall(-3, 3, 3, 3, 0, 3);
+  const walker = standing(shape.collider(), 0, 0);
+  near(walker.eye.z, EYE_M, 1e-6);
+  walk(walker, 1.5, 0, 5);
+  near(walker.feet.x, 3, 1e-6);
+  near(walker.eye.z, EYE_M, 1e-6);
 });
 
 test("the eye rises smoothly over a step", () => {
@@ -121,11 +140,16 @@ test("the eye rises smoothly over a step", () => {
   near(walker.eye.z, 0.19 + EYE_M, 0.01);
 });
 
-for (const dt of [1 / 60, 1 / 4]) {
-  test(`climbs a spiral stair of 6 m and comes down again, ${Math.round(1 / dt)} pictures a second`, () => {
+for (const [dt, missing] of [
+  [1 / 60, []],
+  [1 / 4, []],
+  [1 / 60, [5, 11, 17, 18, 26]],
+] as const) {
+  const name = `${Math.round(1 / dt)} pictures a second, ${missing.length} treads missing`;
+  test(`climbs a spiral stair of 6 m and comes down again, ${name}`, () => {
     const rise = 0.19;
     const steps = 32;
-    const walker = standing(spiral(steps, rise).collider(), 0.7, -0.3);
+    const walker = standing(spiral(steps, rise, missing).collider(), 0.7, -0.3);
     near(walker.feet.z, 0, 1e-6);
     const go = (sense: 1 | -1, until: () => boolean): void => {
       for (let t = 0; t < 60 && !until(); t += dt) {
