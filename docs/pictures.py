@@ -1,0 +1,101 @@
+"""Screenshots of every room of a published tour, for README and docs.
+
+``python docs/pictures.py SITE [FOLDER]`` opens each room as one who comes through a door, in a
+window of a desktop and of a phone, and writes ``ROOM-desktop.webp`` and ``ROOM-phone.webp``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+from PIL import Image
+from playwright.sync_api import Browser, Page, sync_playwright
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from visitor import CHROMIUM, Visitor
+
+from tourgen.doctor import browser as find_browser
+from tourgen.serve import open_server
+
+QUALITY = 72
+
+
+@dataclass(frozen=True)
+class Window:
+    """A visitor's device."""
+
+    name: str
+    width: int
+    height: int
+    touch: bool
+
+
+WINDOWS = (Window("desktop", 1280, 800, touch=False), Window("phone", 390, 780, touch=True))
+
+
+def main() -> None:
+    """Take them all."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("site", type=Path)
+    parser.add_argument("folder", type=Path, nargs="?", default=Path(__file__).parent / "pictures")
+    asked = parser.parse_args()
+    program = find_browser()
+    if program is None:
+        sys.exit("error: chromium: expected on the path, found none\n\nhint: tourgen doctor")
+    asked.folder.mkdir(exist_ok=True)
+    with open_server(asked.site, port=0) as server, sync_playwright() as playwright:
+        Thread(target=server.serve_forever, daemon=True).start()
+        chromium = playwright.chromium.launch(executable_path=program, args=list(CHROMIUM))
+        for window in WINDOWS:
+            for room, picture in pictures(chromium, server.address.rstrip("/"), asked.site, window):
+                file = asked.folder / f"{room}-{window.name}.webp"
+                picture.save(file, quality=QUALITY, method=6)
+                print(f"{file}: {file.stat().st_size / 1000:.0f} kB", flush=True)
+        chromium.close()
+        server.shutdown()
+
+
+def pictures(
+    chromium: Browser, origin: str, site: Path, window: Window
+) -> Iterator[tuple[str, Image.Image]]:
+    """Each room's name and picture."""
+    tour = json.loads((site / "tour.json").read_text(encoding="utf-8"))
+    for room in tour["rooms"]:
+        context = chromium.new_context(
+            viewport={"width": window.width, "height": window.height},
+            is_mobile=window.touch,
+            has_touch=window.touch,
+        )
+        visitor = Visitor(context.new_page(), origin)
+        visitor.open(f"rooms/{room['id']}/index.html")
+        visitor.teleport(**_view(tour, room))
+        yield room["id"], _shot(visitor.page)
+        context.close()
+        if visitor.faults:
+            sys.exit("\n".join(visitor.faults))
+
+
+def _view(tour: dict[str, Any], room: dict[str, Any]) -> dict[str, Any]:
+    """Where one stands who comes in by a door; the entry where no door leads here."""
+    doors = (link for other in tour["rooms"] for link in other["links"])
+    view: dict[str, Any] = next(
+        (d["arrive"] for d in doors if d["to"] == room["id"]), room["entry"]
+    )
+    return view
+
+
+def _shot(page: Page) -> Image.Image:
+    page.wait_for_timeout(1000)  # for labels and posters to fade
+    return Image.open(io.BytesIO(page.screenshot(type="png"))).convert("RGB")
+
+
+if __name__ == "__main__":
+    main()
