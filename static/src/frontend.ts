@@ -98,12 +98,8 @@ export class Frontend {
   }
 
   #showSpots(): void {
-    const door = (name: string) => this.#words.goTo.replace("{name}", name);
     this.spots.show([
-      ...this.#room.links.map((link) => {
-        const name = this.text(link.title);
-        return doorSpot(link, name, door(name), this.#events);
-      }),
+      ...this.#room.links.map((link) => doorSpot(link, this.text(link.title), this.#events)),
       ...this.#room.notes.map((note) =>
         noteSpot(note, this.text(note.title), () => this.#openNote(note), this.#events),
       ),

@@ -15,7 +15,7 @@ const HIDDEN_BELOW = 0.06;
 const EDGE_PX = 24;
 
 export class Hotspots {
-  readonly element = element("div", { class: "spots" });
+  readonly element = element("nav", { class: "spots" });
   #spots: readonly Spot[] = [];
 
   show(spots: readonly Spot[]): void {

@@ -14,10 +14,10 @@ export interface SignEvents {
   reached(at: Triple): void;
 }
 
-export function doorSpot(link: Link, name: string, label: string, events: SignEvents): Spot {
+export function doorSpot(link: Link, name: string, events: SignEvents): Spot {
   const button = element(
     "button",
-    { type: "button", class: "spot door", "data-to": link.to, "aria-label": label },
+    { type: "button", class: "spot door", "data-to": link.to },
     icon(ICONS.door),
     element("span", {}, name),
   );

@@ -26,7 +26,7 @@ const STRIDE_M = 0.04;
 const FOOT_RING_M = 0.12;
 const FOOT_RING = [0, 1, 2, 3, 4, 5].map((i) => (i * Math.PI) / 3);
 /** Boards over holes: short ones as steep as a stair, whatever is below; long level ones over the void. */
-const SHORT_BOARD = { steepness: 0.9, radiiM: [0.2, 0.4, 0.6, 0.8] };
+const SHORT_BOARD = { steepness: 0.9, radiiM: [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8] };
 const LONG_BOARD = { steepness: 0, radiiM: [0.2, 0.4, 0.8, 1.2, 1.6, 2] };
 /** A floor less deep below than this makes a pit of a hole. */
 const PIT_M = 2;
