@@ -21,7 +21,6 @@ Vector = tuple[float, float, float]
 Pair = tuple[float, float]
 
 CELL_M = 0.085
-LIP_M = 0.002  # how far a reveal stands proud of its wall, so that no ray slips between them
 
 
 @dataclass(frozen=True, slots=True)
@@ -382,11 +381,17 @@ def _ring(wall: Wall, opening: Opening, material: Material, *, grain_up: bool) -
     turn = np.linspace(0, 2 * np.pi, 41)
     direction = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     square = direction / np.abs(direction).max(axis=1, keepdims=True)
-    rows = np.linspace(0, 1, 3)[:, None, None]
     radius = opening.width / 2
-    flat = (1 - rows) * square * radius * 1.35 + rows * direction * radius
-    s, z = flat[..., 0] + opening.s, flat[..., 1] + opening.z
-    return chart(wall.point(s, z), np.stack([z, s] if grain_up else [s, z], axis=-1), material)
+    # The outermost row slips behind the wall, whose edge along an arc is divided otherwise.
+    runs = [(square * 1.39, -0.003), (square * 1.34, 0.0), (square * 0.6 + direction * 0.55, 0.0)]
+    runs.append((direction, 0.0))
+    rows = [
+        (radius * flat[:, 0] + opening.s, radius * flat[:, 1] + opening.z, inward)
+        for flat, inward in runs
+    ]
+    points = np.stack([wall.point(s, z, inward) for s, z, inward in rows])
+    paint = np.stack([np.stack([z, s] if grain_up else [s, z], axis=-1) for s, z, _ in rows])
+    return chart(points, paint, material)
 
 
 def reveal(wall: Wall, opening: Opening, material: Material, sill: Material) -> list[Chart]:
@@ -395,7 +400,7 @@ def reveal(wall: Wall, opening: Opening, material: Material, sill: Material) -> 
     middle = wall.point(np.array(opening.s), np.array(opening.z))
     charts: list[Chart] = []
     for k, contour in enumerate(_contour(opening)):
-        near = wall.point(contour[:, 0], contour[:, 1], LIP_M)
+        near = wall.point(contour[:, 0], contour[:, 1])
         reach = opening.depth - ((near - middle) * out).sum(axis=1)
         steps = splits([0.0, 1.0], CELL_M / opening.depth)
         points = near + steps[:, None, None] * reach[None, :, None] * out

@@ -110,9 +110,7 @@ def flight(tread: Material, riser: Material, under: Material) -> list[Chart]:
     charts += soffit(under)
     charts += upright(CLOSED, 0.0, CLOSED / TREAD * RISE - THICK, under, forward=True)
     charts += sector(END, END + LANDING, CLIMB - RISE - THICK + 0.06, under, faces_up=False)
-    charts += upright(
-        END, CLIMB - RISE - THICK - 0.001, CLIMB - RISE - THICK + 0.061, under, forward=False
-    )
+    charts += upright(END, CLIMB - RISE - THICK, CLIMB - RISE - THICK + 0.06, under, forward=True)
     charts += upright(END + LANDING, CLIMB - RISE - THICK + 0.06, CLIMB, under, forward=True)
     return charts
 
@@ -173,9 +171,10 @@ def stairs() -> RoomModel:
 
     bottom = Opening("door", arc(-0.50), 1.0, 0.85, 2.0)
     top = Opening("door", arc(END + LANDING / 2), CLIMB + 1.0, 0.85, 2.0)
+    # No light stands over or under a door: wall and reveal are then divided alike and meet.
     lights = [
         Opening("porthole", arc(turn), turn / TREAD * RISE + 1.55, 0.40, 0.40)
-        for turn in (2.6, 7.7, 12.2)
+        for turn in (1.75, 7.7, 10.2)
     ]
     openings = [bottom, top, *lights]
     span = (-np.pi * RADIUS, np.pi * RADIUS)
