@@ -6,7 +6,7 @@ possible, what still folds over itself is opened conformally or cut, what fills 
 L, a frame) is halved, crumbs join a neighbour, and the charts drop into the picture like the
 pieces of a falling-block game. Everything is deterministic.
 
-Ten leaves of a scanned room of 6 m (3,960 faces each, texels of 5 mm, 4 texels apart), one busy
+Eight leaves of a scanned room of 6 m (3,960 faces each, texels of 5 mm, 4 texels apart), one busy
 core, seconds for 10,000 faces, faces a chart in the median, share of the picture that faces fill:
 
     xatlas 0.0.11, its defaults                                           2.9 s     4    56 %
