@@ -8,13 +8,16 @@ that floor is near the room's lowest: nobody enters on top of a wardrobe.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from tourgen.geometry import Float64, Mesh, View
 
 VERSION = 1
 _STEP_M = 0.5
+_IN_THE_OPEN = 0.8  # inside a solid, one sees backs
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,20 +47,29 @@ def entry_view(mesh: Mesh, stations: Float64, settings: Settings) -> View:
 
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(mesh.vertices, mesh.faces.astype(np.uint32))
-    places = stations if len(stations) else _grid(mesh)
-    eyes = _eyes(scene, places, settings.eye_m)
-    lowest_m = np.nanmin(np.where(np.isfinite(eyes[:, 2]), eyes[:, 2], np.nan))
+    for places in (stations, _grid(mesh)):
+        eyes = _eyes(scene, places, settings.eye_m)
+        views = [view for eye in eyes if (view := _longest(scene, eye, settings))]
+        if views:
+            return max(views, key=lambda view: view[0])[1]
+    middle = np.asarray(mesh.vertices.mean(axis=0), np.float64)
+    return View(middle, middle + np.array([1.0, 0.0, 0.0]))
+
+
+def _longest(scene: Any, eye: Float64, settings: Settings) -> tuple[float, View] | None:
+    """The longest view from a place and its length; None where one cannot stand."""
     azimuth = np.radians(np.arange(0, 360, 5.0))
     heading = np.stack([np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)], axis=1)
+    depth, faces_us = _cast(scene, np.broadcast_to(eye, heading.shape), heading)
+    depth[np.isinf(depth)] = 0  # out of a door: nothing to see
+    if depth[depth > 0].min(initial=np.inf) < settings.clearance_m or not depth.any():
+        return None
+    if faces_us[depth > 0].mean() < _IN_THE_OPEN:
+        return None
     width = int(settings.fan_deg / 5) // 2
-    best_m, best = -np.inf, View(eyes[0], eyes[0] + heading[0])
-    for eye in eyes[eyes[:, 2] < lowest_m + _STEP_M]:
-        depth = np.minimum(_cast(scene, np.broadcast_to(eye, heading.shape), heading), 20.0)
-        seen = np.mean([np.roll(depth, k) for k in range(-width, width + 1)], axis=0)
-        if depth.min() > settings.clearance_m and seen.max() > best_m:
-            ahead = heading[int(np.argmax(seen))]
-            best_m, best = seen.max(), View(eye, eye + 2 * ahead - np.array([0, 0, 0.2]))
-    return best
+    seen = np.mean([np.roll(depth, k) for k in range(-width, width + 1)], axis=0)
+    ahead = heading[int(np.argmax(seen))]
+    return float(seen.max()), View(eye, eye + 2 * ahead - np.array([0, 0, 0.2]))
 
 
 def _grid(mesh: Mesh) -> Float64:
@@ -67,14 +79,18 @@ def _grid(mesh: Mesh) -> Float64:
     return np.array([[a, b, z] for a in x for b in y], np.float64)
 
 
-def _eyes(scene: object, places: Float64, eye_m: float) -> Float64:
-    down = np.broadcast_to([0.0, 0.0, -1.0], places.shape)
-    drop = _cast(scene, places, down)
-    eyes = places.copy()
-    eyes[:, 2] += eye_m - drop
-    return eyes
+def _eyes(scene: Any, places: Float64, eye_m: float) -> Float64:
+    """Eyes over the floor below each place, where that floor is near the lowest."""
+    drop, _ = _cast(scene, places, np.broadcast_to([0.0, 0.0, -1.0], places.shape))
+    found = np.isfinite(drop)
+    eyes = places[found]
+    eyes[:, 2] += eye_m - drop[found]
+    return np.asarray(eyes[eyes[:, 2] < eyes[:, 2].min(initial=np.inf) + _STEP_M])
 
 
-def _cast(scene: object, start: Float64, direction: Float64) -> Float64:
+def _cast(scene: Any, start: Float64, direction: Float64) -> tuple[Float64, npt.NDArray[np.bool_]]:
+    """Distance to what (n, 3) rays hit, and whether they hit its front."""
     rays = np.concatenate([start, direction], axis=1).astype(np.float32)
-    return np.asarray(scene.cast_rays(rays)["t_hit"].numpy(), np.float64)  # type: ignore[attr-defined]
+    hit = scene.cast_rays(rays)
+    front = np.einsum("ij,ij->i", hit["primitive_normals"].numpy(), direction) < 0
+    return hit["t_hit"].numpy().astype(np.float64), front
