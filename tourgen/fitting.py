@@ -250,42 +250,31 @@ def levelled(mesh: Mesh, spacing: Spacing, asked: Detail) -> levels.Levels:
 
 
 def unwrapped(room: tuple[Tile, ...], cloud: PointCloud, asked: Texels) -> tuple[UvMesh, ...]:
-    """Unwrap each tile; its texels are as fine as the scan is there, down to the size asked for.
+    """Unwrap each tile.
 
-    A branch has the texels that its faces make worth: as many a face as a leaf's.
+    A leaf's texels are half as wide as the scan's spacing there, down to the size asked for; a
+    branch's are twice those below it; the root's make a picture of a fixed size.
     """
-    tree = cKDTree(cloud.points)
-    return tuple(
-        unwrap.unwrap(tile.mesh, unwrap.Settings(texel_m))
-        for tile, texel_m in zip(room, _texels(room, tree, asked.texel_mm / 1000), strict=True)
-    )
+    texel_m = _texels(room, cKDTree(cloud.points), asked.texel_mm / 1000)
+    return tuple(unwrap.unwrap(tile.mesh, unwrap.Settings(texel_m[tile.id])) for tile in room)
 
 
-def _texels(room: tuple[Tile, ...], tree: cKDTree, finest_m: float) -> list[float]:
+def _texels(room: tuple[Tile, ...], tree: cKDTree, finest_m: float) -> dict[str, float]:
     rng = np.random.default_rng(0)
-    fine = {}
-    for tile in room:
+    texel_m: dict[str, float] = {}
+    for tile in reversed(room):  # children first
+        if tile.children:
+            texel_m[tile.id] = 2 * float(np.median([texel_m[child] for child in tile.children]))
+            continue
         vertices = tile.mesh.vertices
         sample = vertices[rng.choice(len(vertices), min(200, len(vertices)), replace=False)]
         _, nearest = tree.query(sample)
         spacing_m = spacing_at(tree, tree.data[nearest].astype(np.float32))
-        fine[tile.id] = max(finest_m, float(np.median(spacing_m)))
-    leaf_density = _face_density([tile for tile in room if not tile.children])
-    texels = []
-    for tile in room:
-        if tile.id == "r" and tile.children:
-            texels.append(float(np.sqrt(face_areas(tile.mesh).sum() / _ROOT_TEXELS)))
-        elif tile.children:
-            texels.append(fine[tile.id] * float(np.sqrt(leaf_density / _face_density([tile]))))
-        else:
-            texels.append(fine[tile.id])
-    return texels
-
-
-def _face_density(some: list[Tile]) -> float:
-    """Faces a square metre."""
-    area = sum(float(face_areas(tile.mesh).sum()) for tile in some)
-    return sum(len(tile.mesh.faces) for tile in some) / area
+        texel_m[tile.id] = max(finest_m, 0.5 * float(np.median(spacing_m)))
+    root = room[0]
+    if root.children:
+        texel_m[root.id] = float(np.sqrt(face_areas(root.mesh).sum() / _ROOT_TEXELS))
+    return texel_m
 
 
 def baked(

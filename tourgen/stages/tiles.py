@@ -17,11 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from tourgen.geometry import Float32, Mesh, Tile
+from tourgen.geometry import Mesh, Tile
 from tourgen.stages.levels import Levels
-from tourgen.stages.mesh_arrays import compact, weld
+from tourgen.stages.mesh_arrays import compact, components, face_adjacency, weld
 
-VERSION = 1
+VERSION = 2
+_ISLAND_FACES = 60
 _IDS = "0123456789abcdefghijklmnopqrstuvwxyz"
 
 
@@ -51,12 +52,11 @@ def tiles(levels: Levels, settings: Settings) -> tuple[Tile, ...]:
         All tiles, parents before children; the first is the root, whose mesh is the coarse one.
     """
     finest = levels.finest
-    leaves = int(np.ceil(len(finest.faces) / settings.leaf_faces))
-    if leaves == 1:
+    count = int(np.ceil(len(finest.faces) / settings.leaf_faces))
+    if count == 1:
         return (Tile("r", finest, 0.0, ()),)
-    centre = finest.vertices[finest.faces].mean(axis=1)
-    everything = np.arange(len(finest.faces))
-    branches = _children("r", finest, centre, everything, leaves, settings)
+    leaves = _leaf_meshes(finest, count)
+    branches = _children("r", leaves, settings)
     error_m = max(
         _deviation_m(finest, levels.root), 2 * max(b[0].geometric_error_m for b in branches)
     )
@@ -64,58 +64,70 @@ def tiles(levels: Levels, settings: Settings) -> tuple[Tile, ...]:
     return (root, *(tile for branch in branches for tile in branch))
 
 
-def _children(
-    parent: str,
-    finest: Mesh,
-    centre: Float32,
-    faces: npt.NDArray[np.int64],
-    leaves: int,
-    settings: Settings,
-) -> list[tuple[Tile, ...]]:
+def _leaf_meshes(finest: Mesh, count: int) -> list[Mesh]:
+    """Bisect the faces along the longest axis; leaves that are near are near in the list."""
+    centre = finest.vertices[finest.faces].mean(axis=1)
+    label = np.empty(len(centre), np.int64)
+
+    def bisect(faces: npt.NDArray[np.int64], first: int, last: int) -> None:
+        if last - first == 1:
+            label[faces] = first
+            return
+        middle = (first + last) // 2
+        at = centre[faces]
+        order = np.argsort(at[:, np.argmax(np.ptp(at, axis=0))], kind="stable")
+        cut = len(faces) * (middle - first) // (last - first)
+        bisect(faces[order[:cut]], first, middle)
+        bisect(faces[order[cut:]], middle, last)
+
+    bisect(np.arange(len(centre)), 0, count)
+    label = _without_islands(label, finest)
+    return [compact(finest, faces) for i in range(count) if (faces := label == i).any()]
+
+
+def _without_islands(label: npt.NDArray[np.int64], mesh: Mesh) -> npt.NDArray[np.int64]:
+    """Hand pieces of a few faces to the neighbour that they share most edges with.
+
+    A straight cut through a jagged mesh leaves such pieces on both its sides; each would be a
+    chart of its own.
+    """
+    pairs = face_adjacency(mesh.faces)
+    same = label[pairs[:, 0]] == label[pairs[:, 1]]
+    piece = components(pairs[same], len(label))
+    small = np.bincount(piece) < _ISLAND_FACES
+    across = np.concatenate([pairs[~same], pairs[~same][:, ::-1]])
+    across = across[small[piece[across[:, 0]]] & ~small[piece[across[:, 1]]]]
+    key, edges = np.unique(
+        np.stack([piece[across[:, 0]], label[across[:, 1]]]), axis=1, return_counts=True
+    )
+    moved_to = np.full(len(small), -1)
+    order = np.argsort(edges, kind="stable")  # the last write is the neighbour of most edges
+    moved_to[key[0, order]] = key[1, order]
+    target = moved_to[piece]
+    return np.where(target >= 0, target, label)
+
+
+def _children(parent: str, leaves: list[Mesh], settings: Settings) -> list[tuple[Tile, ...]]:
     """The subtrees under a tile; the first tile of each is its top."""
-    depth = max(1, round(np.log(leaves) / np.log(settings.children)))
-    count = min(leaves, int(np.ceil(leaves ** (1 / depth) - 1e-9)), len(_IDS))
-    share = [leaves * (i + 1) // count - leaves * i // count for i in range(count)]
-    parts = _split(faces, centre, share)
+    depth = max(1, round(np.log(len(leaves)) / np.log(settings.children)))
+    count = min(len(leaves), int(np.ceil(len(leaves) ** (1 / depth) - 1e-9)), len(_IDS))
+    bounds = [len(leaves) * i // count for i in range(count + 1)]
     return [
-        _subtree(parent + _IDS[i], finest, centre, part, share[i], settings)
-        for i, part in enumerate(parts)
+        _subtree(parent + _IDS[i], leaves[bounds[i] : bounds[i + 1]], settings)
+        for i in range(count)
     ]
 
 
-def _subtree(
-    name: str,
-    finest: Mesh,
-    centre: Float32,
-    faces: npt.NDArray[np.int64],
-    leaves: int,
-    settings: Settings,
-) -> tuple[Tile, ...]:
-    if leaves == 1:
-        return (Tile(name, compact(finest, faces), 0.0, ()),)
-    below = _children(name, finest, centre, faces, leaves, settings)
+def _subtree(name: str, leaves: list[Mesh], settings: Settings) -> tuple[Tile, ...]:
+    if len(leaves) == 1:
+        return (Tile(name, leaves[0], 0.0, ()),)
+    below = _children(name, leaves, settings)
     tops = [subtree[0] for subtree in below]
     fine = weld([top.mesh for top in tops])
     mesh = _simplify_locked(fine, settings.branch_ratio)
     error_m = max(_deviation_m(fine, mesh), 1e-4) + max(top.geometric_error_m for top in tops)
     top = Tile(name, mesh, error_m, tuple(child.id for child in tops))
     return (top, *(tile for subtree in below for tile in subtree))
-
-
-def _split(
-    faces: npt.NDArray[np.int64], centre: Float32, share: list[int]
-) -> list[npt.NDArray[np.int64]]:
-    """Bisect along the longest axis until each part holds its share of the faces."""
-    if len(share) == 1:
-        return [faces]
-    half = len(share) // 2
-    at = centre[faces]
-    axis = int(np.argmax(np.ptp(at, axis=0)))
-    cut = len(faces) * sum(share[:half]) // sum(share)
-    order = np.argsort(at[:, axis], kind="stable")
-    return _split(faces[order[:cut]], centre, share[:half]) + _split(
-        faces[order[cut:]], centre, share[half:]
-    )
 
 
 def _simplify_locked(mesh: Mesh, ratio: float) -> Mesh:
