@@ -42,14 +42,13 @@ at = [-1.4, 0.0, 1.0]
 """
 
 
-def write_box_tour(folder: Path) -> Path:
+def write_box_tour(folder: Path) -> None:
     """Write tour.toml and scans."""
-    (folder / "scans").mkdir(parents=True)
+    (folder / "scans").mkdir()
     (folder / "tour.toml").write_text(TOUR, encoding="utf-8")
     for seed, name in enumerate(("left", "right")):
         points, colors = box_scan(seed)
         write_ply(folder / f"scans/{name}.ply", cloud_table(points, colors))
-    return folder
 
 
 def box_scan(
