@@ -36,7 +36,7 @@ class Settings:
         tree_points: Most points that the spanning tree is grown on.
     """
 
-    neighbours: int = 16
+    neighbours: int = 10
     sight_cell_deg: float = 0.5
     tree_points: int = 40_000
 
