@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from multiprocessing.queues import SimpleQueue
 from threading import Thread
 
@@ -72,6 +72,15 @@ def _attempt(recipe: RoomRecipe, cache: Cache, listener: Listener) -> RoomResult
 def _initialise(events: SimpleQueue[Started | None]) -> None:
     global _events  # a queue reaches a pool's process only this way
     _events = events
+    Thread(target=_die_with_parent, daemon=True).start()
+
+
+def _die_with_parent() -> None:
+    """A build that was killed leaves no process behind that works on for nobody."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _in_worker(recipe: RoomRecipe, cache: Cache) -> RoomResult | TourgenError:

@@ -1,0 +1,182 @@
+"""From oriented points to the finest mesh: closed where it should be, open where one looks out."""
+
+from __future__ import annotations
+
+import numpy as np
+import open3d as o3d
+import pytest
+import trimesh
+
+from tourgen.errors import StageError
+from tourgen.geometry import Mesh, OrientedCloud, PointCloud
+from tourgen.stages import hygiene, levels, measure, trim
+from tourgen.stages.mesh_arrays import components, face_adjacency, face_areas, weld
+from tourgen.stages.surface import poisson
+
+STATION = np.array([[0.3, 0.2, 1.5]])
+WINDOW = ((1.9, -0.5, 1.0), (2.1, 0.5, 2.0))
+
+
+def room_cloud() -> OrientedCloud:
+    """A 4 x 4.8 x 2.5 m room with a window in the wall x = 2 and a blind disc."""
+    rng = np.random.default_rng(0)
+    points, normals = [], []
+    for axis, side, inward in (
+        (0, -2.0, 1), (0, 2.0, -1), (1, -2.4, 1), (1, 2.4, -1), (2, 0.0, 1), (2, 2.5, -1),
+    ):  # fmt: skip
+        face = rng.uniform([-2, -2.4, 0], [2, 2.4, 2.5], (25_000, 3))
+        face[:, axis] = side
+        points.append(face)
+        normal = np.zeros((25_000, 3))
+        normal[:, axis] = inward
+        normals.append(normal)
+    at, normal = np.concatenate(points), np.concatenate(normals)
+    gap = inside(at, WINDOW)
+    gap |= (at[:, 2] == 0) & (np.linalg.norm(at[:, :2] - STATION[0, :2], axis=1) < 0.85)
+    keep = ~gap
+    cloud = PointCloud(
+        np.zeros(3),
+        np.float32(at[keep]),
+        np.full((keep.sum(), 3), 128, np.uint8),
+        np.zeros(keep.sum(), np.int16),
+    )
+    return OrientedCloud(cloud, np.float32(normal[keep]), STATION)
+
+
+def inside(points: np.ndarray, box: tuple[tuple[float, ...], ...]) -> np.ndarray:
+    return np.all((points >= box[0]) & (points <= box[1]), axis=1)
+
+
+@pytest.fixture(scope="module")
+def oriented() -> OrientedCloud:
+    return room_cloud()
+
+
+@pytest.fixture(scope="module")
+def solved(oriented: OrientedCloud) -> Mesh:
+    return poisson.poisson(oriented, poisson.Settings(cell_m=0.05))
+
+
+@pytest.fixture(scope="module")
+def trimmed(oriented: OrientedCloud, solved: Mesh) -> Mesh:
+    return trim.trim(solved, oriented, oriented.cloud, trim.Settings(support_m=0.12))
+
+
+def scene(mesh: Mesh) -> o3d.t.geometry.RaycastingScene:
+    made = o3d.t.geometry.RaycastingScene()
+    made.add_triangles(mesh.vertices, mesh.faces.astype(np.uint32))
+    return made
+
+
+def covered(mesh: Mesh, start: list[float], toward: list[float]) -> bool:
+    """Whether a ray meets the mesh within a metre of where the wall should be."""
+    way = np.subtract(toward, start)
+    length = float(np.linalg.norm(way))
+    ray = np.float32([[*start, *(way / length)]])
+    return float(scene(mesh).cast_rays(ray)["t_hit"].numpy()[0]) < length + 1
+
+
+# ------------------------------------------------------------------ poisson
+
+
+def test_the_surface_lies_on_the_walls_and_looks_inward(solved: Mesh) -> None:
+    shape = trimesh.Trimesh(solved.vertices, solved.faces, process=False)
+    assert shape.is_watertight
+    assert shape.volume == pytest.approx(-4 * 4.8 * 2.5, rel=0.02), "seen from within"
+
+
+@pytest.mark.parametrize(("cell_m", "depth"), [(0.05, 7), (0.025, 8), (10.0, 6), (1e-4, 12)])
+def test_the_depth_follows_the_room_and_the_cell(cell_m: float, depth: int) -> None:
+    assert poisson.octree_depth(np.array([[0, 0, 0], [4, 4, 2.5]]), cell_m) == depth
+
+
+# ------------------------------------------------------------------ trim
+
+
+def test_windows_open_and_blind_discs_stay_closed(solved: Mesh, trimmed: Mesh) -> None:
+    eye = [0.0, 0.0, 1.5]
+    assert covered(solved, eye, [2, 0, 1.5])
+    assert not covered(trimmed, eye, [2, 0, 1.5]), "the window"
+    assert covered(trimmed, [0.3, 0.2, 1.5], [0.3, 0.2, 0.0]), "the floor under the tripod"
+    assert covered(trimmed, eye, [-2, 0, 1.5]), "a wall"
+    lost = face_areas(solved).sum() - face_areas(trimmed).sum()
+    assert lost == pytest.approx(1.0, abs=0.35), "as much as the window, and nothing else"
+
+
+def test_what_is_marked_closed_stays(oriented: OrientedCloud, solved: Mesh) -> None:
+    kept = trim.trim(
+        solved, oriented, oriented.cloud, trim.Settings(support_m=0.12, closed=(WINDOW,))
+    )
+    assert covered(kept, [0, 0, 1.5], [2, 0, 1.5])
+
+
+def test_without_stations_small_gaps_are_bridged(oriented: OrientedCloud, solved: Mesh) -> None:
+    unknown = OrientedCloud(oriented.cloud, oriented.normals, np.empty((0, 3)))
+    wide = trim.trim(solved, unknown, oriented.cloud, trim.Settings(0.12, bridge_area_m2=5))
+    narrow = trim.trim(solved, unknown, oriented.cloud, trim.Settings(0.12, bridge_area_m2=0.1))
+    assert len(wide.faces) == len(solved.faces)
+    assert not covered(narrow, [0, 0, 1.5], [2, 0, 1.5])
+
+
+# ------------------------------------------------------------------ hygiene
+
+
+def test_crumbs_doubles_and_overfull_edges_go() -> None:
+    ball = trimesh.creation.icosphere(3, 1.0)
+    crumb = trimesh.creation.icosphere(1, 0.01)
+    crumb.apply_translation((3, 0, 0))
+    both = trimesh.util.concatenate([ball, crumb])
+    flap = [*both.faces[0][:2], len(both.vertices)]
+    vertices = np.vstack([both.vertices, [0, 0, 5]])
+    faces = np.vstack([both.faces, both.faces[:1], [0, 0, 1], [flap]])
+    mesh = Mesh(np.zeros(3), np.float32(vertices), np.int32(faces))
+    clean = hygiene.hygiene(mesh, hygiene.Settings(crumb_area_m2=0.1))
+    edge = np.sort(clean.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert np.unique(edge, axis=0, return_counts=True)[1].max() == 2
+    assert (face_areas(clean) > 0).all()
+    assert components(face_adjacency(clean.faces), len(clean.faces)).max() == 0
+    assert len(clean.faces) >= len(ball.faces) - 1
+
+
+def test_only_crumbs_is_an_error() -> None:
+    ball = trimesh.creation.icosphere(1, 0.01)
+    with pytest.raises(StageError, match="only crumbs"):
+        hygiene.hygiene(
+            Mesh(np.zeros(3), np.float32(ball.vertices), np.int32(ball.faces)), hygiene.Settings()
+        )
+
+
+# ------------------------------------------------------------------ levels, measure
+
+
+def test_levels_have_the_faces_asked_for_and_stay_near(trimmed: Mesh) -> None:
+    ends = levels.levels(trimmed, levels.Settings(0.05, face_detail_ratio=1.5, root_faces=800))
+    assert len(ends.root.faces) <= 800
+    assert 800 < len(ends.finest.faces) < len(trimmed.faces)
+    shape = scene(trimmed)
+    for mesh, near_m in ((ends.finest, 0.02), (ends.root, 0.06)):
+        distance = shape.compute_distance(mesh.vertices).numpy()
+        assert np.quantile(distance, 0.95) < near_m
+
+
+def test_quality_tells_distance_and_what_is_inferred(oriented: OrientedCloud) -> None:
+    shell = trimesh.creation.box((4, 4.8, 2.5))
+    shell.apply_translation((0, 0, 1.25))
+    shell = shell.subdivide_to_size(0.05)
+    mesh = Mesh(np.zeros(3), np.float32(shell.vertices), np.int32(shell.faces))
+    quality = measure.measure(mesh, oriented.cloud, measure.Settings(support_m=0.12))
+    assert quality.cloud_to_mesh_p95_mm < 0.01
+    assert quality.area_m2 == pytest.approx(82.4, rel=1e-4)
+    gaps = np.pi * (0.85 - 0.12) ** 2 + (1 - 0.24) ** 2
+    assert quality.inferred_area_ratio == pytest.approx(gaps / 82.4, rel=0.15)
+
+
+def test_welding_joins_what_lies_at_one_place() -> None:
+    box = trimesh.creation.box((1, 1, 1))
+    parts = [
+        Mesh(np.zeros(3), np.float32(box.vertices), np.int32(box.faces[half]))
+        for half in (slice(0, 6), slice(6, 12))
+    ]
+    joined = weld(parts)
+    assert len(joined.vertices) == 8
+    assert trimesh.Trimesh(joined.vertices, joined.faces, process=False).is_watertight
