@@ -47,7 +47,7 @@ from tourgen.tileset import tileset_json
 from tourgen.tour import Box, Room, Viewpoint, open_scans
 
 _FINEST_DETAIL_M = 0.004
-_ROOT_TEXELS = 600_000
+_ROOT_TEXELS = 500_000
 
 Corner = tuple[float, float, float]
 

@@ -78,8 +78,8 @@ class ProgressBars:
         estimate = self._estimates.setdefault(event.room, Estimate(event.scan_mb, event.ahead))
         left = duration(estimate.left_s(event.ahead)) if event.ahead else "done"
         if not self.console.is_terminal:
-            told = f"{event.room}: {event.stage}, {left}"
-            self.console.print(told, highlight=False)
+            told = ", ".join(filter(None, [event.stage, left]))
+            self.console.print(f"{event.room}: {told}", highlight=False)
             return
         if event.room not in self._bars:
             self._bars[event.room] = self._display.add_task(

@@ -18,6 +18,7 @@ from tourgen.geometry import Float64, Mesh, View
 VERSION = 1
 _STEP_M = 0.5
 _IN_THE_OPEN = 0.8  # inside a solid, one sees backs
+_ENCLOSED = 0.7  # in a doorway, one sees half the sky
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +65,7 @@ def _longest(scene: Any, eye: Float64, settings: Settings) -> tuple[float, View]
     depth[np.isinf(depth)] = 0  # out of a door: nothing to see
     if depth[depth > 0].min(initial=np.inf) < settings.clearance_m or not depth.any():
         return None
-    if faces_us[depth > 0].mean() < _IN_THE_OPEN:
+    if faces_us[depth > 0].mean() < _IN_THE_OPEN or (depth > 0).mean() < _ENCLOSED:
         return None
     width = int(settings.fan_deg / 5) // 2
     seen = np.mean([np.roll(depth, k) for k in range(-width, width + 1)], axis=0)

@@ -16,7 +16,7 @@ from scipy.signal import fftconvolve
 
 from tourgen.geometry import Float32, Float64
 
-VERSION = 1
+VERSION = 2
 _SECTORS = 8
 
 
@@ -28,14 +28,16 @@ class Settings:
         blind_angle_deg: Half opening of the cone under the scanner that it does not see.
         radius_m: Smallest and largest radius of a blind disc.
         cell_m: Edge of a cell of the floor's density map.
-        contrast: Least step of log density at the disc's edge; e times denser is 1.
+        contrast: Least step of log density at the disc's edge (e times denser is 1), over the
+            step at the smallest and the largest radius. Measured: discs 0.8 to 3.1, all else
+            below 0.5.
         most: Most stations looked for.
     """
 
     blind_angle_deg: float = 30.0
     radius_m: tuple[float, float] = (0.5, 1.15)
     cell_m: float = 0.04
-    contrast: float = 1.0
+    contrast: float = 0.65
     most: int = 12
 
 
@@ -60,6 +62,8 @@ def find_stations(points: Float32, settings: Settings) -> Float64:
     density = np.log1p(gaussian_filter(count.reshape(shape).astype(float), 1.0))
     radii = np.arange(*settings.radius_m, settings.cell_m)
     score = np.stack([_ring_response(density, radius / settings.cell_m) for radius in radii])
+    # A table's leg answers the smallest radii, a wall the largest ones.
+    score -= np.maximum(np.maximum(score[0], score[-1]), 0)
     found = []
     for _ in range(settings.most):
         best = np.unravel_index(np.argmax(score), score.shape)

@@ -31,7 +31,7 @@ class Settings:
     cell_m: float
     depth: int = 0
     samples_per_node: float = 1.0
-    point_weight: float = 18.0
+    point_weight: float = 16.0
 
 
 def poisson(oriented: OrientedCloud, settings: Settings) -> Mesh:
