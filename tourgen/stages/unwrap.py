@@ -8,22 +8,22 @@ Seven leaves, a branch and the root of a scanned room of 6 m (4,000 to 12,000 fa
 5 mm on leaves), one core of a busy machine, seconds for 10,000 faces, share of the picture that
 faces fill, and how far edges are stretched at the 95th percentile of the area:
 
-    before: own packing, conformal maps, halved boxes        4.4 s    58 %    1.10
-    this stage                                               1.1 s    59 %    1.12
+    before: own packing, conformal maps, halved boxes        4.1 s    58 %    1.10
+    this stage                                               1.4 s    61 %    1.11
+    this stage, packing by bruteForce                        2.5 s    63 %    1.11
 
 Xatlas making the charts too: 2.9 s and 56 %, charts of 4 faces in the median (eight other leaves).
 
-Packing alone, eight leaves, seconds for 10,000 faces and share of the picture filled:
+Packing alone, fourteen leaves, seconds for 10,000 faces and share of the picture filled:
 
-    random places, charts turned upright by us               0.11 s   61 %   (chosen)
-    the same, charts turned to stand or to lie               0.11 s   61, 60 %
-    the same, bruteForce                                     0.20 s   62 %
-    rotate_charts, which mirrors charts                      0.10 s   63 %
-    rotate_charts and bruteForce                             0.21 s   65 %
-
-    on the charts before, random places                      0.11 s   63 %
-    on the charts before, rotate_charts_to_axis alone        0.11 s   59 %
-    on the charts before, own falling-block packing          0.78 s   64 %
+    random places, charts turned to the least box            0.11 s   55 %
+    all standing                                             0.11 s   58 %
+    all lying                                                0.11 s   57 %
+    the best of the three                                    0.33 s   59 %   (chosen)
+    bruteForce, the best of the three                        0.57 s   61 %
+    the same, and turned as rotate_charts would              0.99 s   62 %
+    bruteForce and rotate_charts, which mirrors charts       0.23 s   60 %
+    own falling-block packing, on charts made for it         0.78 s   61 %
 
 Also tried, with next to no effect on charts or fill, and so left out: opening folds conformally,
 halving charts that fill their box badly, halving by two means, cutting many folds otherwise than
@@ -207,33 +207,52 @@ def _packed(mesh: Mesh, charts: _Charts, thick: Bool, settings: Settings) -> UvM
         chart[:, None] * len(mesh.vertices) + mesh.faces, return_index=True, return_inverse=True
     )
     faces = faces.reshape(-1, 3)
-    flat, owner = corners.reshape(-1, 2)[first], key // len(mesh.vertices)
-    shift, size = _places(flat, faces, chart, thick, settings.padding_texels)
-    width, height = (-(-int(side) // 4) * 4 for side in size)
+    flat = corners.reshape(-1, 2)[first]
+    owner = (key // len(mesh.vertices)).astype(np.int64)
+    width, height, placed = min(
+        (
+            _placed(turned, owner, np.where(thick[:, None], faces, -1), settings.padding_texels)
+            for turned in _turns(flat, owner)
+        ),
+        key=lambda layout: layout[0] * layout[1],
+    )
     return UvMesh(
         Mesh(mesh.origin, mesh.vertices[key % len(mesh.vertices)], faces.astype(np.int32)),
-        ((flat + shift[owner]) / (width, height)).astype(np.float32),
+        (placed / (width, height)).astype(np.float32),
         chart.astype(np.int32),
         (width, height),
         settings.texel_m,
     )
 
 
-def _places(
-    flat: Float64, faces: Int64, chart: Int64, thick: Bool, padding: int
-) -> tuple[Float64, tuple[int, int]]:
-    """(c, 2) whole texels to shift each chart by, and the width and height of the picture.
+def _turns(flat: Float64, owner: Int64) -> tuple[Float64, ...]:
+    """(u, 2) the charts as they are, all standing, all lying: each packs some tiles best."""
+    _, high = boxes(flat, owner)
+    quarter = np.stack([high[owner, 1] - flat[:, 1], flat[:, 0]], axis=1)
+    wide = (high[:, 0] > high[:, 1])[owner, None]
+    return flat, np.where(wide, quarter, flat), np.where(wide, flat, quarter)
+
+
+def _placed(flat: Float64, owner: Int64, faces: Int64, padding: int) -> tuple[int, int, Float64]:
+    """Width and height of a picture that holds the charts, and (u, 2) where in it they lie.
 
     Xatlas stretches charts to whole texels, which would change the size of a texel on the
     surface, and begins them amid a texel: so of its coordinates only the place of each chart is
     taken, to whole texels, and a texel more is kept between charts for each of both. It mirrors
     the charts that it rotates, so they are turned before.
+
+    Args:
+        flat: (u, 2) texels, each chart from (0, 0).
+        owner: (u,) chart of each vertex.
+        faces: (f, 3) indices of vertices, -1 for those that no texel could show.
+        padding: Texels between two charts.
     """
     import xatlas
 
-    # It skips faces without area: those share a triangle of one texel.
+    # It skips faces without area: those share a triangle of one texel, the last chart.
     spot = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    proxy = np.where(thick[:, None], faces, len(flat) + np.arange(3))
+    proxy = np.where(faces < 0, len(flat) + np.arange(3), faces)
+    chart = np.append(owner, np.full(3, owner.max()))[proxy[:, 0]]
     atlas = xatlas.Atlas()
     atlas.add_uv_mesh(
         np.concatenate([flat, spot]).astype(np.float32),
@@ -248,4 +267,5 @@ def _places(
     _, indices, uvs = atlas.get_mesh(0)
     size = (atlas.width, atlas.height)
     low, _ = boxes((uvs.astype(np.float64) * size)[indices].reshape(-1, 2), np.repeat(chart, 3))
-    return np.round(low - 0.5) + _BORDER, (size[0] + 2 * _BORDER, size[1] + 2 * _BORDER)
+    width, height = (-(-(side + 2 * _BORDER) // 4) * 4 for side in size)
+    return width, height, flat + (np.round(low - 0.5) + _BORDER)[owner]
