@@ -92,7 +92,7 @@ lint: install
 
 .PHONY: bench
 bench: demo
-	$(BIN)/python tests/peers/score.py $(DEMO)
+	$(BIN)/python tests/peers/score.py $(DEMO) --table docs/benchmarks.md
 
 # ---- What is kept up
 

@@ -90,6 +90,10 @@ def _positive(text: str) -> int:
     return number
 
 
+def _rooms(count: int) -> str:
+    return f"{count} room{'s' * (count != 1)}"
+
+
 def _print_json(content: Any) -> None:
     print(json.dumps(content, indent=2, ensure_ascii=False))
 
@@ -121,7 +125,7 @@ def _check(asked: argparse.Namespace) -> int:
         return 0
     for warning in warnings:
         print(f"warning: {warning}")
-    print(f"{len(tour.rooms)} rooms, no fault; now: tourgen build {asked.folder}")
+    print(f"{_rooms(len(tour.rooms))}, no fault; now: tourgen build {asked.folder}")
     return 0
 
 
@@ -158,7 +162,7 @@ def _build(asked: argparse.Namespace) -> int:
         for warning in room["warnings"]:
             print(f"warning: room `{room_id}`: {warning}")
     print(
-        f"built {out}: {len(report['rooms'])} rooms, {report['total_bytes'] / 1e6:.1f} MB, "
+        f"built {out}: {_rooms(len(report['rooms']))}, {report['total_bytes'] / 1e6:.1f} MB, "
         f"{report['ran_stages']} stages run, {report['cached_stages']} from the cache, "
         f"{report['seconds']:.1f} s"
     )

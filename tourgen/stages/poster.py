@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from tourgen.geometry import Float32, TexturedMesh, UInt8, View
 
-VERSION = 1
+VERSION = 2
 
 _SAMPLES = 2  # rays a pixel along each axis
 _BEHIND = 4  # faces seen from behind that a ray passes at most
@@ -36,15 +36,13 @@ class Settings:
         width: Pixels.
         height: Pixels.
         field_of_view_deg: From the bottom to the top of the picture.
-        sky: sRGB at the top, where no surface is.
-        ground: sRGB at the bottom, where no surface is.
+        void: sRGB where no surface is; that of the viewer, so that nothing jumps.
     """
 
     width: int = 1600
     height: int = 900
     field_of_view_deg: float = 65.0
-    sky: tuple[int, int, int] = (38, 44, 54)
-    ground: tuple[int, int, int] = (14, 16, 20)
+    void: tuple[int, int, int] = (205, 216, 224)
 
 
 def poster(tiles: Sequence[TexturedMesh], view: View, settings: Settings) -> UInt8:
@@ -70,8 +68,7 @@ def poster(tiles: Sequence[TexturedMesh], view: View, settings: Settings) -> UIn
     for row in range(0, settings.height, _ROWS_AT_ONCE):
         rows = slice(row, row + _ROWS_AT_ONCE)
         fine = directions[row * _SAMPLES : (row + _ROWS_AT_ONCE) * _SAMPLES]
-        backdrop = _backdrop(len(fine), row * _SAMPLES, settings)
-        colors = scene.look(eye, fine.reshape(-1, 3), backdrop.reshape(-1, 3))
+        colors = scene.look(eye, fine.reshape(-1, 3), settings.void)
         shape = (len(fine) // _SAMPLES, _SAMPLES, settings.width, _SAMPLES, 3)
         picture[rows] = colors.reshape(shape).mean((1, 3))
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
@@ -93,14 +90,6 @@ def _directions(view: View, settings: Settings) -> Float32:
     return np.asarray(directions, np.float32)
 
 
-def _backdrop(rows: int, first: int, settings: Settings) -> Float32:
-    """(rows, w, 3): from sky to ground."""
-    down = (first + np.arange(rows) + 0.5) / (settings.height * _SAMPLES)
-    color = (1 - down[:, None]) * np.array(settings.sky) + down[:, None] * np.array(settings.ground)
-    wide = np.broadcast_to(color[:, None], (rows, settings.width * _SAMPLES, 3))
-    return wide.astype(np.float32)
-
-
 class _Scene:
     """Tiles that rays can be cast at."""
 
@@ -118,9 +107,9 @@ class _Scene:
             )
             self._tiles[int(key)] = tile
 
-    def look(self, eye: Float32, directions: Float32, colors: Float32) -> Float32:
-        """(n, 3) what each ray sees; ``colors`` where it meets nothing."""
-        colors = colors.copy()
+    def look(self, eye: Float32, directions: Float32, void: tuple[int, int, int]) -> Float32:
+        """(n, 3) what each ray sees; ``void`` where it meets nothing."""
+        colors = np.tile(np.array(void, np.float32), (len(directions), 1))
         start = np.broadcast_to(eye, directions.shape).copy()
         going = np.arange(len(directions))
         for _ in range(_BEHIND + 1):
