@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from tourgen.geometry import Float64, Mesh, View
 
-VERSION = 1
+VERSION = 2
 _STEP_M = 0.5
 _IN_THE_OPEN = 0.8  # inside a solid, one sees backs
 _ENCLOSED = 0.7  # in a doorway, one sees half the sky
@@ -48,29 +48,54 @@ def entry_view(mesh: Mesh, stations: Float64, settings: Settings) -> View:
 
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(mesh.vertices, mesh.faces.astype(np.uint32))
-    for places in (stations, _grid(mesh)):
-        eyes = _eyes(scene, places, settings.eye_m)
-        views = [view for eye in eyes if (view := _longest(scene, eye, settings))]
-        if views:
-            return max(views, key=lambda view: view[0])[1]
+    for least_around in (_ENCLOSED, 0.05):  # scans of a part of a room are open on most sides
+        for places in (stations, _grid(mesh)):
+            eyes = _eyes(scene, places, settings.eye_m)
+            views = [v for eye in eyes if (v := _longest(scene, eye, least_around, settings))]
+            if views:
+                return max(views, key=lambda view: view[0])[1]
     middle = np.asarray(mesh.vertices.mean(axis=0), np.float64)
     return View(middle, middle + np.array([1.0, 0.0, 0.0]))
 
 
-def _longest(scene: Any, eye: Float64, settings: Settings) -> tuple[float, View] | None:
-    """The longest view from a place and its length; None where one cannot stand."""
-    azimuth = np.radians(np.arange(0, 360, 5.0))
-    heading = np.stack([np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)], axis=1)
-    depth, faces_us = _cast(scene, np.broadcast_to(eye, heading.shape), heading)
+def _longest(
+    scene: Any, eye: Float64, least_around: float, settings: Settings
+) -> tuple[float, View] | None:
+    """The longest view from a place and its length; None where one cannot stand.
+
+    Args:
+        scene: The room.
+        eye: (3,) metres.
+        least_around: Share of the directions in which there must be a surface.
+        settings: See ``Settings``.
+    """
+    azimuth, elevation = np.meshgrid(
+        np.radians(np.arange(0, 360, 5.0)), np.radians([0.0, -40, -25, -10, 15]), indexing="ij"
+    )
+    heading = np.stack(
+        [
+            np.cos(azimuth) * np.cos(elevation),
+            np.sin(azimuth) * np.cos(elevation),
+            np.sin(elevation),
+        ],
+        axis=-1,
+    )
+    ways = heading.reshape(-1, 3)
+    depth, front = _cast(scene, np.broadcast_to(eye, ways.shape), ways)
     depth[np.isinf(depth)] = 0  # out of a door: nothing to see
-    if depth[depth > 0].min(initial=np.inf) < settings.clearance_m or not depth.any():
+    depth, front = depth.reshape(azimuth.shape), front.reshape(azimuth.shape)
+    hit = depth > 0
+    level = depth[:, 0][hit[:, 0]]
+    if hit.mean() < least_around or level.min(initial=np.inf) < settings.clearance_m:
         return None
-    if faces_us[depth > 0].mean() < _IN_THE_OPEN or (depth > 0).mean() < _ENCLOSED:
+    if front[hit].mean() < _IN_THE_OPEN:
         return None
     width = int(settings.fan_deg / 5) // 2
-    seen = np.mean([np.roll(depth, k) for k in range(-width, width + 1)], axis=0)
-    ahead = heading[int(np.argmax(seen))]
-    return float(seen.max()), View(eye, eye + 2 * ahead - np.array([0, 0, 0.2]))
+    fan = range(-width, width + 1)
+    seen = np.mean([np.roll(depth.mean(axis=1), k) for k in fan], axis=0)
+    ahead = (int(np.argmax(seen)) + np.array(fan)) % len(depth)
+    met = eye + (heading[ahead] * depth[ahead, :, None])[hit[ahead]]
+    return float(seen.max()), View(eye, met.mean(axis=0))
 
 
 def _grid(mesh: Mesh) -> Float64:
