@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ import numpy as np
 
 from tourgen.cache import Cache
 from tourgen.errors import Faults, InputError, TourgenError
-from tourgen.geometry import UInt8, View
+from tourgen.geometry import View
 from tourgen.pipeline import RoomRecipe, RoomResult, planned, tour_recipes
 from tourgen.progress import Listener
 from tourgen.report import tour_report
@@ -21,7 +20,6 @@ from tourgen.site import BuiltRoom, write_site
 from tourgen.tour import Link, Tour, Viewpoint
 from tourgen.workers import build_rooms, cores
 
-_POSTER_QUALITY = 82
 _STEP_INSIDE_M = 0.9
 
 
@@ -79,7 +77,8 @@ def build_tour(
     cache = Cache(tour.folder)
     recipes = tour_recipes(tour, cache)
     _require_built(recipes, [tour.room(room_id).id for room_id in only], cache)
-    outcomes = build_rooms(recipes, cache, min(jobs or cores(), len(recipes)), listener)
+    at_work = sum(bool(planned(recipe, cache)) for recipe in recipes)
+    outcomes = build_rooms(recipes, cache, max(1, min(jobs or cores(), at_work)), listener)
     rooms = [outcome for outcome in outcomes if isinstance(outcome, RoomResult)]
     if len(rooms) < len(outcomes):
         raise RoomsFailed(tuple(each for each in outcomes if isinstance(each, TourgenError)))
@@ -111,7 +110,7 @@ def _published(tour: Tour, rooms: Mapping[str, RoomResult]) -> list[BuiltRoom]:
             built.summary.bounds[1],
             built.entry,
             tuple(_arrival(tour, link, room.id, rooms[link.to]) for link in room.links),
-            {**built.files, "poster.webp": _webp(built.poster)},
+            {**built.files, "poster.webp": built.poster},
             built.summary.points_used,
             built.summary.levels[-1].faces,
         )
@@ -139,11 +138,3 @@ def _arrival(tour: Tour, link: Link, source: str, target: RoomResult) -> View:
 def _view(given: Viewpoint, room: RoomResult) -> View:
     origin = room.summary.origin
     return View(np.array(given.position) - origin, np.array(given.look_at) - origin)
-
-
-def _webp(picture: UInt8) -> bytes:
-    from PIL import Image
-
-    stream = io.BytesIO()
-    Image.fromarray(picture).save(stream, "WEBP", quality=_POSTER_QUALITY, method=6)
-    return stream.getvalue()

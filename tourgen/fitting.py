@@ -7,6 +7,7 @@ the tour file says, are what enters the stage's key.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +23,6 @@ from tourgen.geometry import (
     PointCloud,
     TexturedMesh,
     Tile,
-    UInt8,
     UvMesh,
     View,
 )
@@ -48,6 +48,7 @@ from tourgen.tour import Box, Room, Viewpoint, open_scans
 
 _FINEST_DETAIL_M = 0.004
 _ROOT_TEXELS = 500_000
+_POSTER_QUALITY = 82
 
 Corner = tuple[float, float, float]
 
@@ -315,10 +316,15 @@ def pictured(
     textured: tuple[TexturedMesh, ...],
     view: View,
     settings: poster.Settings,
-) -> UInt8:
-    """Render the first view from the finest level."""
+) -> bytes:
+    """Render the first view from the finest level, as WebP."""
+    from PIL import Image
+
     leaves = [each for tile, each in zip(room, textured, strict=True) if not tile.children]
-    return poster.poster(leaves, view, settings)
+    stream = io.BytesIO()
+    picture = Image.fromarray(poster.poster(leaves, view, settings))
+    picture.save(stream, "WEBP", quality=_POSTER_QUALITY, method=6)
+    return stream.getvalue()
 
 
 def measured(simplified: levels.Levels, cloud: PointCloud, spacing: Spacing) -> measure.Quality:

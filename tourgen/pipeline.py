@@ -14,7 +14,7 @@ from typing import Any
 
 from tourgen import fitting
 from tourgen.cache import Cache, Cost
-from tourgen.geometry import UInt8, View
+from tourgen.geometry import View
 from tourgen.progress import Listener, Started
 from tourgen.stages import (
     bake,
@@ -46,7 +46,7 @@ class RoomRecipe:
         room: The room.
         scan_mb: Size of its scans, megabytes.
         files: Published files by path below the room's folder.
-        poster: (h, w, 3) picture of the first view.
+        poster: Picture of the first view, WebP.
         entry: The first view.
         quality: How well the surface follows the scan.
         summary: The room in figures.
@@ -55,7 +55,7 @@ class RoomRecipe:
     room: Room
     scan_mb: float
     files: Task[Mapping[str, bytes]]
-    poster: Task[UInt8]
+    poster: Task[bytes]
     entry: Task[View]
     quality: Task[measure.Quality]
     summary: Task[fitting.Summary]
@@ -213,7 +213,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         entered,
         settings=poster.Settings(),
         version=poster.VERSION,
-        libraries=("open3d",),
+        libraries=("open3d", "pillow"),
     )
     measured = task(
         "measure",
@@ -236,7 +236,7 @@ class RoomResult:
     Attributes:
         id: The room.
         files: Published files by path below the room's folder.
-        poster: (h, w, 3) uint8.
+        poster: Picture of the first view, WebP.
         entry: The first view.
         quality: How well the surface follows the scan.
         summary: The room in figures.
@@ -246,7 +246,7 @@ class RoomResult:
 
     id: str
     files: Mapping[str, bytes]
-    poster: UInt8
+    poster: bytes
     entry: View
     quality: measure.Quality
     summary: fitting.Summary

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from tourgen.geometry import Float32, TexturedMesh, UInt8, View
 
-VERSION = 2
+VERSION = 3
 
 _SAMPLES = 2  # rays a pixel along each axis
 _BEHIND = 4  # faces seen from behind that a ray passes at most

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
-from scipy.signal import fftconvolve
 
 from tourgen.geometry import Float32, Float64
 
@@ -94,6 +93,8 @@ def _ring_response(density: Float64, radius: float) -> Float64:
     The circle is cut into sectors and a quarter of them may be worse than the answer: furniture
     hides a part of many a disc, and a ring that is there only in part is the flank of another.
     """
+    from scipy.signal import fftconvolve  # takes a second to load
+
     reach = int(np.ceil(radius * 1.3)) + 1
     x, y = np.mgrid[-reach : reach + 1, -reach : reach + 1]
     r, sector = np.hypot(x, y), ((np.arctan2(y, x) + np.pi) / (2 * np.pi) * _SECTORS).astype(int)
