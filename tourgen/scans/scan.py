@@ -158,6 +158,6 @@ def to_8_bit(colors: npt.NDArray[np.generic], full: float) -> UInt8:
     """(n, 3) colours of any type, `full` being full brightness, to uint8; no number is black."""
     if full == 255.0 and colors.dtype == np.uint8:
         return colors.astype(np.uint8, copy=False)
-    scaled = np.nan_to_num(colors.astype(np.float32), posinf=full) * np.float32(255.0 / full)
-    limited: UInt8 = np.clip(np.rint(scaled), 0, 255).astype(np.uint8)
-    return limited
+    within = np.nan_to_num(np.clip(colors, 0, full)).astype(np.float32)
+    scaled: UInt8 = np.rint(within * np.float32(255.0 / full)).astype(np.uint8)
+    return scaled
