@@ -34,9 +34,10 @@ BLIND = np.radians(60)
 """Steeper down than this a station sees nothing."""
 SAME = 0.99
 """Part of the way to a point that a ray must get to have met that point."""
-LEVEL_PX = 5
-"""By how much a silhouette before an opening may move from one level to the next: the miniature's
-coarser tiles are off by up to 20 mm, 5 pixels at a metre. A crack runs on, away from all void."""
+LEVEL_PX = 8
+"""By how much a silhouette before an opening may move from one level to the next: of the
+miniature's coarser tiles one vertex in twenty is off by more than 20 mm, 5 pixels at a metre (its
+lamp, a thin shade before a porthole, by 7). A crack runs on, away from all void."""
 HOLES = 1e-3
 """Part of all pixels in which a surface that was scanned may be missing: the miniature's points
 lie 20 mm apart, and thin things seen edge-on are lost between them."""
