@@ -1,7 +1,7 @@
 """Progress: which stage works on which room, and how long is left.
 
-The time left starts from what each stage took for a megabyte of scan where it was measured, and
-is corrected by how this machine does on this room.
+The time left starts from a rough guess of what each stage takes for a megabyte of scan, and is
+corrected by how this machine does on this room.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-#: Seconds a megabyte of scan, measured on one core; 0.05 for a stage not named.
+#: Seconds a megabyte of scan, a rough guess; 0.05 for a stage not named.
 _SECONDS_PER_MB = {
     "scan": 0.1, "clean": 0.3, "thin": 0.1, "normals": 0.2, "surface": 2.0, "trim": 0.2,
     "hygiene": 0.3, "levels": 0.3, "unwrap": 2.0, "bake": 1.0, "pack": 0.5, "poster": 0.3,

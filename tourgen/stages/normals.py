@@ -7,7 +7,7 @@ Orientation, best evidence first:
    station that sees the point most squarely; points that no station sees follow their
    neighbours.
 3. No station: a minimum spanning tree over the tangent planes (Hoppe et al. 1992), on a thinned
-   cloud, since 0.9 million points take 93 s and 40,000 take 2; the whole is then turned so that
+   cloud, since 0.9 million points take 93 s; the whole is then turned so that
    most normals look inward, as those of a room do.
 """
 

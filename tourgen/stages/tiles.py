@@ -3,11 +3,10 @@
 Faces are divided by a k-d tree over their centroids, down to leaves of ``leaf_faces``. A branch
 takes its children's faces, welds them and simplifies them with its outer border locked. Every
 border is thus the same polyline at all levels: tiles of any levels meet exactly, without skirts,
-and nothing can poke through thin things. The price is full resolution along the borders of
-coarse tiles, a tenth of their faces.
+and nothing can poke through thin things. The price is full resolution along the borders: 470 to
+1,190 border vertices in branches of about 4,160 faces (a hall of 27 m at 20 mm).
 
-Tried and rejected: levels simplified over the whole room and then cut (cracks of several
-millimetres between levels, which skirts hide only from one side, and not at 20 mm rails).
+Not tried: levels simplified over the whole room and then cut, whose tiles would need skirts.
 """
 
 from __future__ import annotations
