@@ -103,6 +103,29 @@ def test_windows_open_and_blind_discs_stay_closed(solved: Mesh, trimmed: Mesh) -
     assert lost == pytest.approx(1.0, abs=0.35), "as much as the window, and nothing else"
 
 
+def test_a_bulge_is_drawn_back_behind_what_was_measured(oriented: OrientedCloud) -> None:
+    """A board hides the gap in the wall; the surface bulges out in front of the board."""
+    rng = np.random.default_rng(3)
+    board = np.float32(rng.uniform([1.5, -0.9, 0.7], [1.5, 0.9, 2.3], (20_000, 3)))
+    points = np.concatenate([oriented.cloud.points, board])
+    kind = np.zeros(len(points), np.int16)
+    full = PointCloud(np.zeros(3), points, np.zeros((len(points), 3), np.uint8), kind)
+    box = trimesh.creation.box((4, 4.8, 2.5)).apply_translation([0, 0, 1.25])
+    box.invert()
+    for _ in range(6):
+        box = box.subdivide()
+    vertices = np.float32(box.vertices)
+    hidden = inside(vertices, WINDOW)
+    from_middle = np.linalg.norm(vertices[hidden, 1:] - [0, 1.5], axis=1)
+    vertices[hidden, 0] -= 0.8 * np.cos(np.minimum(from_middle, 0.5) * np.pi) ** 2
+    bulging = Mesh(np.zeros(3), vertices, box.faces.astype(np.int32))
+    mended = trim.trim(bulging, oriented, full, trim.Settings(support_m=0.12))
+    assert len(mended.faces) == len(bulging.faces), "nothing is cut"
+    assert vertices[hidden, 0].min() < 1.21
+    assert mended.vertices[hidden, 0].min() > 1.3, "up to a margin before the board"
+    np.testing.assert_array_equal(mended.vertices[~hidden], vertices[~hidden])
+
+
 def test_what_is_marked_closed_stays(oriented: OrientedCloud, solved: Mesh) -> None:
     kept = trim.trim(
         solved, oriented, oriented.cloud, trim.Settings(support_m=0.12, closed=(WINDOW,))

@@ -125,7 +125,7 @@ def test_where_no_disc_is_none_is_found() -> None:
 # ------------------------------------------------------------------ sight, normals
 
 
-def test_a_station_sees_what_nothing_hides_and_looks_through_what_is_not_there() -> None:
+def test_a_station_sees_what_nothing_hides_and_knows_what_is_empty() -> None:
     eye = np.array([0.0, 0.0, 1.5])
     points, inward = box_points(200_000)
     rng = np.random.default_rng(5)
@@ -148,10 +148,15 @@ def test_a_station_sees_what_nothing_hides_and_looks_through_what_is_not_there()
     assert buffer.sees(np.float32(points[clear]), cosine[clear]).mean() > 0.995
     glass = np.float32(points[window] * [0.8, 1, 1])
     inner = (np.abs(glass[:, 0]) < 0.3) & (np.abs(glass[:, 2] - 1.5) < 0.3)
-    assert buffer.looks_through(glass[inner], -58, 0.08).all()
-    assert not buffer.looks_through(np.float32(points[~window]), -58, 0.08).any()
+    free = sight.free_space(seen, eye[None], 0.75, -58, 0.08)
+    assert free.holds(glass[inner]).all()
+    assert free.leads_out(glass[inner]).all()
+    assert not free.holds(np.float32(points[~window])).any()
+    assert not free.leads_out(np.float32(points[~window & (points[:, 2] > 0.5)])).any()
+    before = np.float32(eye + 0.8 * (points[clear & (points[:, 2] > 0.5)] - eye))
+    assert free.holds(before).mean() > 0.99
     under = np.float32([[0.2, 0.1, 0.0]])
-    assert not buffer.looks_through(under, -58, 0.08).any(), "it lies under the tripod"
+    assert not free.holds(under).any(), "it lies under the tripod"
 
 
 @pytest.mark.parametrize(

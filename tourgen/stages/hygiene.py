@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from tourgen.errors import StageError
 from tourgen.geometry import Mesh
-from tourgen.stages.mesh_arrays import compact, components, face_adjacency, face_areas
+from tourgen.stages.mesh_arrays import compact, components, edges, face_adjacency, face_areas
 
 VERSION = 1
 
@@ -56,7 +56,7 @@ def _large_enough(mesh: Mesh, least_m2: float) -> npt.NDArray[np.bool_]:
 
 def _without_overfull_edges(mesh: Mesh) -> Mesh:
     """Drop the smallest faces of each edge that more than two faces share."""
-    edge = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
+    edge = np.sort(edges(mesh.faces), axis=1)
     face = np.repeat(np.arange(len(mesh.faces)), 3)
     order = np.lexsort((-face_areas(mesh)[face], edge[:, 0] << 32 | edge[:, 1]))
     key = (edge[:, 0] << 32 | edge[:, 1])[order]

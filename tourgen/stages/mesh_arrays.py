@@ -28,6 +28,30 @@ def face_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
     return np.asarray(normal / np.maximum(length, 1e-20), np.float32)
 
 
+def vertex_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
+    """Unit normal of each vertex, of the faces around it by their areas; zero where none has."""
+    of_faces = _doubled_normals(mesh)
+    normal = np.stack([_sum_at_vertices(mesh, of_faces[:, axis]) for axis in range(3)], axis=1)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.asarray(normal / np.maximum(length, 1e-20), np.float32)
+
+
+def vertex_areas(mesh: Mesh) -> npt.NDArray[np.float64]:
+    """A third of the faces around each vertex, square metres."""
+    return _sum_at_vertices(mesh, face_areas(mesh) / 3)
+
+
+def edges(faces: Int32) -> npt.NDArray[np.int64]:
+    """(3 f, 2) the directed edges of all faces."""
+    return faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+
+
+def _sum_at_vertices(mesh: Mesh, of_faces: npt.NDArray[np.floating]) -> npt.NDArray[np.float64]:
+    count = len(mesh.vertices)
+    summed = np.bincount(mesh.faces.reshape(-1), np.repeat(of_faces, 3), minlength=count)
+    return np.asarray(summed, np.float64)
+
+
 def _doubled_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
     return np.asarray(np.cross(b - a, c - a), np.float32)
@@ -35,7 +59,7 @@ def _doubled_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
 
 def face_adjacency(faces: Int32) -> npt.NDArray[np.int64]:
     """(m, 2) pairs of faces that share an edge; an edge of more than two faces gives a chain."""
-    edge = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
+    edge = np.sort(edges(faces), axis=1)
     key = edge[:, 0] << 32 | edge[:, 1]
     order = np.argsort(key, kind="stable")
     same = np.flatnonzero(key[order[1:]] == key[order[:-1]])

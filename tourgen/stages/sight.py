@@ -1,8 +1,8 @@
 """Sight: what a scanner standing somewhere would see of a cloud.
 
 A spherical depth buffer: for each direction, the nearest point. It answers two questions that
-normals and trimming ask: is this point visible from there, and does a station look through this
-place without hitting anything?
+normals and trimming ask: is this point visible from there, and is this place known to be empty,
+because a station measured what lies behind it, or nothing at all?
 """
 
 from __future__ import annotations
@@ -50,18 +50,49 @@ class DepthBuffer:
         span_m = distance * np.float32(np.radians(self.cell_deg)) * slant
         return np.asarray(distance - span_m - margin_m <= self.range_m.reshape(-1)[cell])
 
-    def looks_through(
-        self, points: Float32, lowest_deg: float, margin_m: float
-    ) -> npt.NDArray[np.bool_]:
-        """Mask of the (n, 3) places where a surface would have been measured and was not.
 
-        Such a place lies within the field of view, and neither in its direction nor in the
-        cells around is anything as near, give or take ``margin_m``.
-        """
-        cell, distance, elevation = self.cells(points)
-        nearest = minimum_filter(self.range_m, size=3, mode=("nearest", "wrap"))
-        free = distance + margin_m < nearest.reshape(-1)[cell]
-        return np.asarray(free & (elevation > lowest_deg))
+@dataclass(frozen=True, slots=True)
+class FreeSpace:
+    """What stations know to be empty.
+
+    Attributes:
+        buffers: One a station; each cell holds the nearest of its own and the cells around.
+        lowest_deg: Lower edge of the scanners' field of view.
+        margin_m: How far in front of what was measured a place is known to be empty.
+    """
+
+    buffers: tuple[DepthBuffer, ...]
+    lowest_deg: float
+    margin_m: float
+
+    def holds(self, points: Float32) -> npt.NDArray[np.bool_]:
+        """Mask of the (n, 3) places where a surface would have been measured and was not."""
+        free = np.zeros(len(points), bool)
+        for buffer in self.buffers:
+            cell, distance, elevation = buffer.cells(points)
+            reach_m = buffer.range_m.reshape(-1)[cell]
+            free |= (distance + self.margin_m < reach_m) & (elevation > self.lowest_deg)
+        return free
+
+    def leads_out(self, points: Float32) -> npt.NDArray[np.bool_]:
+        """Mask of the (n, 3) places in whose direction a station measured nothing at all."""
+        out = np.zeros(len(points), bool)
+        for buffer in self.buffers:
+            cell, _, elevation = buffer.cells(points)
+            out |= np.isinf(buffer.range_m.reshape(-1)[cell]) & (elevation > self.lowest_deg)
+        return out
+
+
+def free_space(
+    points: Float32, stations: Float64, cell_deg: float, lowest_deg: float, margin_m: float
+) -> FreeSpace:
+    """What (s, 3) stations that measured (n, 3) points know to be empty."""
+    buffers = []
+    for station in stations:
+        buffer = depth_buffer(points, station, cell_deg)
+        nearest = minimum_filter(buffer.range_m, size=3, mode=("nearest", "wrap"))
+        buffers.append(DepthBuffer(station, cell_deg, nearest))
+    return FreeSpace(tuple(buffers), lowest_deg, margin_m)
 
 
 def depth_buffer(points: Float32, station: Float64, cell_deg: float) -> DepthBuffer:
