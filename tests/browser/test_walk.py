@@ -29,12 +29,17 @@ WALKING_LINE_M = 0.66
 RISER_M = 0.19
 
 
-def within(seconds: float, what: str) -> Iterator[None]:
+def within(visitor: Visitor, what: str) -> Iterator[None]:
     """Steps of a loop that must come to its end in time."""
-    end = time.monotonic() + seconds
+    end = time.monotonic() + PATIENCE_S
+    frames = visitor.stats["frames"]
     while time.monotonic() < end:
         yield
-    pytest.fail(f"{what}: still not so after {seconds:.0f} s")
+    pace = (visitor.stats["frames"] - frames) / PATIENCE_S
+    pytest.fail(
+        f"{what}: still not so after {PATIENCE_S:.0f} s at {pace:.1f} pictures a second; "
+        f"the eye is at {visitor.position.round(2)} and looks along {visitor.look.round(2)}"
+    )
 
 
 def off_by(visitor: Visitor, target: Vector) -> float:
@@ -118,7 +123,7 @@ def push_ahead(visitor: Visitor) -> None:
 
 def look_at(visitor: Visitor, target: Vector, press: Any) -> None:
     """Drag until a place is in the middle of the picture, sideways."""
-    for _ in within(PATIENCE_S, f"looking at {target}"):
+    for _ in within(visitor, f"looking at {target}"):
         off = off_by(visitor, target)
         if abs(off) < 0.1:
             return
@@ -148,7 +153,7 @@ def climb(visitor: Visitor) -> list[Vector]:
     """Walk up the spiral until the landing; returns the way."""
     keys = Keys(visitor)
     way = [visitor.position]
-    for _ in within(PATIENCE_S, "climbing the stair"):
+    for _ in within(visitor, "climbing the stair"):
         here = visitor.position
         way.append(here)
         if here[2] > CLIMB_M + EYE_M - 0.1:
@@ -181,7 +186,7 @@ def test_round_of_all_rooms(site: Path, visit: Visit) -> None:
 
     door = link(site, "stairs", "chamber2")
     keys = Keys(here)
-    for _ in within(PATIENCE_S, "passing the upper door"):
+    for _ in within(here, "passing the upper door"):
         if here.room == "chamber2":
             break
         keys.step_towards(np.array(door["at"]))
@@ -189,7 +194,7 @@ def test_round_of_all_rooms(site: Path, visit: Visit) -> None:
     assert_arrived(here, door)
 
     door = link(site, "chamber2", "chamber1")
-    for _ in within(PATIENCE_S, "reaching the door by touch"):
+    for _ in within(here, "reaching the door by touch"):
         if here.room == "chamber1":
             break
         look_at(here, np.array(door["at"]), finger)
@@ -227,7 +232,7 @@ def test_click_on_the_floor_goes_there(site: Path, visit: Visit) -> None:
     here.teleport(**arrival(site, "chamber1"))
     start = here.position
     here.page.mouse.click(MIDDLE[0], SIZE[1] - 60)
-    for _ in within(PATIENCE_S, "walking to the clicked place"):
+    for _ in within(here, "walking to the clicked place"):
         if np.linalg.norm(here.position - start) > 0.3:
             break
     here.settle()

@@ -122,7 +122,7 @@ def test_a_bulge_is_drawn_back_behind_what_was_measured(oriented: OrientedCloud)
     mended = trim.trim(bulging, oriented, full, trim.Settings(support_m=0.12))
     assert len(mended.faces) == len(bulging.faces), "nothing is cut"
     assert vertices[hidden, 0].min() < 1.21
-    assert mended.vertices[hidden, 0].min() > 1.3, "up to a margin before the board"
+    assert mended.vertices[hidden, 0].min() > 1.3, "as far as the board, but for the smoothing"
     np.testing.assert_array_equal(mended.vertices[~hidden], vertices[~hidden])
 
 

@@ -21,7 +21,7 @@ marked closed (mirrors, black screens: the scanner sees through those too) alway
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -40,7 +40,7 @@ from tourgen.stages.mesh_arrays import (
 )
 from tourgen.stages.sight import FreeSpace, free_space
 
-VERSION = 2
+VERSION = 3
 _STEP_M = 0.02
 _FARTHEST_M = 1.5
 """A bulge deeper than this is none."""
@@ -58,6 +58,7 @@ class Settings:
         lowest_deg: Lower edge of a scanner's field of view.
         sight_cell_deg: Cell of the stations' depth buffers.
         margin_m: How far in front of what was measured space is known to be empty.
+        back_margin_m: The same where a bulge comes to rest.
         door_area_m2: An opening as large is one, whatever is around it.
         bridge_area_m2: Largest gap that is bridged where no station is known.
         closed: Boxes ((min), (max)), metres from the origin, in which every surface stays.
@@ -67,6 +68,7 @@ class Settings:
     lowest_deg: float = -58.0
     sight_cell_deg: float = 0.75
     margin_m: float = 0.08
+    back_margin_m: float = 0.02
     door_area_m2: float = 0.3
     bridge_area_m2: float = 0.3
     closed: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ...] = ()
@@ -106,7 +108,7 @@ def trim(mesh: Mesh, oriented: OrientedCloud, full: PointCloud, settings: Settin
     out = free.leads_out(mesh.vertices[at])
     large = (np.bincount(region, area_m2) > settings.door_area_m2)[region]
     opening = _mostly(out, region, area_m2) & (large | _mostly(out, patch, area_m2))
-    back_m = _way_back(mesh, at, free)
+    back_m = _way_back(mesh, at, replace(free, margin_m=settings.back_margin_m))
     cut = opening | _mostly(np.isnan(back_m), region, area_m2)
     drawn = _drawn_back(mesh, at[~cut], np.nan_to_num(back_m[~cut]))
     gone = np.zeros(len(mesh.vertices), bool)
