@@ -119,7 +119,8 @@ class Clean(_Table):
         ge=0.5,
         le=100,
         description="Points closer together than this are merged for the surface; the colours "
-        "come from all points. Left out: half of `surface.detail_mm`.",
+        "come from all points. Left out: half of `surface.detail_mm`; more, up to twice as much, "
+        "where the scan is denser than that.",
     )
 
 
@@ -134,7 +135,7 @@ class Surface(_Table):
         ge=1,
         le=500,
         description="The finest detail that the surface shall show. Left out: the spacing of the "
-        "scan's points in the middle, at least 4.",
+        "scan's points in the middle, at least 6.",
     )
     depth: Whole | None = Field(
         default=None,

@@ -15,7 +15,7 @@ import type { Triple } from "./tour.ts";
 
 export const EYE_M = 1.6;
 /** The highest riser that is climbed. */
-export const STEP_M = 0.3;
+export const STEP_M = 0.26;
 /** The deepest edge that is stepped down. */
 export const DROP_M = 0.6;
 const RADIUS_M = 0.22;

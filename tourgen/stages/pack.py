@@ -22,7 +22,7 @@ from tourgen.errors import StageError
 if TYPE_CHECKING:
     from tourgen.geometry import Float32, Float64, Int32, TexturedMesh, UInt8
 
-VERSION = 1
+VERSION = 2
 
 STEP_M = 2.0**-12
 _MOST_BITS = 24  # a float32 holds no more
@@ -222,6 +222,7 @@ def _glb(geometry: _Geometry, webp: bytes) -> bytes:
                     roughnessFactor=1.0,
                 ),
                 alphaCutoff=None,
+                doubleSided=True,  # simplification folds some faces over; culled, they are holes
                 extensions={unlit: {}},
             )
         ],

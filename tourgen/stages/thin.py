@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from tourgen.geometry import Float32, PointCloud
 
-VERSION = 1
+VERSION = 2
 _AXIS_BITS = 21
 
 
