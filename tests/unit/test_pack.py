@@ -138,7 +138,7 @@ def test_the_document_says_what_the_buffers_hold() -> None:
     assert set(document["extensionsRequired"]) <= set(document["extensionsUsed"])
     material = document["materials"][primitive["material"]]
     assert "KHR_materials_unlit" in material["extensions"]
-    assert not material.get("doubleSided", False)
+    assert material["doubleSided"]
     source = document["textures"][0]["extensions"]["EXT_texture_webp"]["source"]
     image = Image.open(io.BytesIO(view(document, binary, document["images"][source]["bufferView"])))
     assert image.format == "WEBP"

@@ -49,7 +49,7 @@ def test_where_nothing_is_the_void_shows() -> None:
     assert np.abs(picture[0] - SMALL.void).max() <= 1
 
 
-def test_faces_are_looked_through_from_behind() -> None:
+def test_faces_are_seen_from_behind_too() -> None:
     near = wall(turned=True)
     raised = mesh(near.uv_mesh.mesh.vertices + np.float32([0, 0, 0.5]), near.uv_mesh.mesh.faces)
     shade = TexturedMesh(
@@ -57,7 +57,7 @@ def test_faces_are_looked_through_from_behind() -> None:
         np.zeros((40, 40, 3), np.uint8),
     )
     eye = view((0, -0.05, 1.2), (0, 0, 0))
-    assert np.array_equal(poster([shade, wall()], eye, SMALL), poster([wall()], eye, SMALL))
+    assert (poster([shade, wall()], eye, SMALL) == 0).all()
 
 
 def test_the_nearer_tile_hides_the_farther() -> None:

@@ -1,8 +1,8 @@
 """Poster: what a visitor sees on entering, rendered by ray casting, without GPU or browser.
 
 Rays through Embree (Open3D's RaycastingScene) at twice the size each way, the pictures of the
-tiles read with bilinear blending, four rays averaged a pixel. Faces seen from behind are looked
-through, as the viewer does.
+tiles read with bilinear blending, four rays averaged a pixel. Faces are
+seen from both sides, as in the viewer.
 """
 
 from __future__ import annotations
@@ -20,11 +20,9 @@ if TYPE_CHECKING:
 
     from tourgen.geometry import Float32, TexturedMesh, UInt8, View
 
-VERSION = 3
+VERSION = 4
 
 _SAMPLES = 2  # rays a pixel along each axis
-_BEHIND = 4  # faces seen from behind that a ray passes at most
-_PAST_M = 1e-3
 _ROWS_AT_ONCE = 128
 
 
@@ -110,42 +108,22 @@ class _Scene:
     def look(self, eye: Float32, directions: Float32, void: tuple[int, int, int]) -> Float32:
         """(n, 3) what each ray sees; ``void`` where it meets nothing."""
         colors = np.tile(np.array(void, np.float32), (len(directions), 1))
-        start = np.broadcast_to(eye, directions.shape).copy()
-        going = np.arange(len(directions))
-        for _ in range(_BEHIND + 1):
-            rays = np.concatenate([start[going], directions[going]], axis=1)
-            hit = self._cast(rays)
-            met = np.isfinite(hit["t_hit"])
-            front = met & (np.einsum("nx,nx->n", hit["primitive_normals"], directions[going]) < 0)
-            self._paint(colors, going, front, hit)
-            behind = met & ~front
-            onward = hit["t_hit"][behind] * (1 + 1e-5)
-            going = going[behind]
-            if not len(going):
-                break
-            length = np.linalg.norm(directions[going], axis=1)
-            start[going] += directions[going] * (onward + _PAST_M / length)[:, None]
+        rays = np.concatenate([np.broadcast_to(eye, directions.shape), directions], axis=1)
+        hit = self._cast(rays)
+        geometry = hit["geometry_ids"]
+        met = np.isfinite(hit["t_hit"])
+        for key in np.unique(geometry[met]):
+            which = np.flatnonzero(met & (geometry == key))
+            tile = self._tiles[int(key)]
+            corner = tile.uv_mesh.uv[tile.uv_mesh.mesh.faces[hit["primitive_ids"][which]]]
+            u, v = hit["primitive_uvs"][which].T[..., None]
+            uv = corner[:, 0] * (1 - u - v) + corner[:, 1] * u + corner[:, 2] * v
+            colors[which] = _bilinear(tile.texture, uv)
         return colors
 
     def _cast(self, rays: Float32) -> dict[str, npt.NDArray[Any]]:
         answer = self._scene.cast_rays(self._tensor(np.ascontiguousarray(rays, np.float32)))
         return {name: value.numpy() for name, value in answer.items()}
-
-    def _paint(
-        self,
-        colors: Float32,
-        going: npt.NDArray[np.int64],
-        front: npt.NDArray[np.bool_],
-        hit: dict[str, npt.NDArray[Any]],
-    ) -> None:
-        geometry = hit["geometry_ids"]
-        for key in np.unique(geometry[front]):
-            which = np.flatnonzero(front & (geometry == key))
-            tile = self._tiles[int(key)]
-            corner = tile.uv_mesh.uv[tile.uv_mesh.mesh.faces[hit["primitive_ids"][which]]]
-            u, v = hit["primitive_uvs"][which].T[..., None]
-            uv = corner[:, 0] * (1 - u - v) + corner[:, 1] * u + corner[:, 2] * v
-            colors[going[which]] = _bilinear(tile.texture, uv)
 
 
 def _bilinear(texture: UInt8, uv: Float32) -> Float32:
