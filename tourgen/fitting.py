@@ -31,6 +31,7 @@ from tourgen.stages import (
     bake,
     clean,
     entry,
+    floor,
     levels,
     measure,
     pack,
@@ -222,6 +223,11 @@ def thinned(cloud: PointCloud, spacing: Spacing, asked: Thinning) -> PointCloud:
     detail = detail_m(spacing, asked.detail_mm)
     voxel_m = max(detail / 2, detail - spacing.median_m / 2)
     return thin.thin(cloud, thin.Settings(asked.thin_mm / 1000 if asked.thin_mm else voxel_m))
+
+
+def floored(oriented: OrientedCloud, spacing: Spacing) -> OrientedCloud:
+    """Lay the floor under the tripods as densely as the scan is."""
+    return floor.floor(oriented, floor.Settings(spacing.median_m))
 
 
 def solved(oriented: OrientedCloud, spacing: Spacing, asked: Solving) -> Mesh:

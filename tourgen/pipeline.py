@@ -20,6 +20,7 @@ from tourgen.stages import (
     bake,
     clean,
     entry,
+    floor,
     hygiene,
     levels,
     measure,
@@ -114,7 +115,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         settings=fitting.Thinning(detail_mm, room.clean.thin_mm),
         version=thin.VERSION,
     )
-    oriented = task(
+    turned = task(
         "normals",
         normals.normals,
         thinned,
@@ -123,6 +124,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         version=normals.VERSION,
         libraries=("open3d", "scipy"),
     )
+    oriented = task("floor", fitting.floored, turned, spaced, version=floor.VERSION)
     solved = task(
         "surface",
         fitting.solved,

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tourgen.errors import InputError
-from tourgen.geometry import PointCloud
-from tourgen.stages import clean, normals, sight, spacing, stations, thin
+from tourgen.geometry import OrientedCloud, PointCloud
+from tourgen.stages import clean, floor, normals, sight, spacing, stations, thin
 
 ROOM_M = np.array([4.0, 5.0, 2.6])
 
@@ -186,3 +188,38 @@ def test_hidden_points_follow_their_neighbours() -> None:
     oriented = normals.normals(cloud(both), np.array([[-1.0, 0, 1.5]]), normals.Settings())
     wall = (both[:, 0] > 1.99) & (np.abs(both[:, 1]) < 2.4)
     assert (oriented.normals[wall, 0] < 0).mean() > 0.98
+
+
+# ------------------------------------------------------------------ floor
+
+
+def oriented_box(eyes: np.ndarray, keep: Callable[[np.ndarray], np.ndarray]) -> OrientedCloud:
+    points = scanned_box(eyes, 60_000)
+    points = points[keep(points)]
+    up = np.zeros(points.shape, np.float32)
+    up[np.arange(len(points)), np.argmin(np.abs(np.abs(points) - ROOM_M * [0.5, 0.5, 0]), 1)] = 1
+    up[points[:, 2] > 2] *= -1
+    return OrientedCloud(cloud(points), up, eyes)
+
+
+def test_the_floor_goes_on_below_a_tripod() -> None:
+    eye = np.array([[0.4, -0.3, 1.5]])
+    bare = oriented_box(eye, lambda points: np.ones(len(points), bool))
+    laid = floor.floor(bare, floor.Settings(spacing_m=0.03))
+    new = laid.cloud.points[len(bare.cloud) :]
+    assert np.abs(new[:, 2]).max() < 0.01
+    away = np.linalg.norm(new[:, :2] - eye[0, :2], axis=1)
+    assert away.max() < 1.5 * np.tan(np.radians(32)) + 0.01
+    disc_m2 = np.pi * (1.5 * np.tan(np.radians(30))) ** 2
+    assert len(new) * 0.03**2 == pytest.approx(disc_m2, rel=0.1)
+    assert (laid.normals[len(bare.cloud) :] == [0, 0, 1]).all()
+    assert (laid.cloud.station[len(bare.cloud) :] == -1).all()
+
+
+def test_no_floor_is_laid_where_something_stands_or_nothing_is_level() -> None:
+    eyes = np.array([[0.4, -0.3, 1.5], [-0.9, 1.2, 1.5]])
+    seen = oriented_box(eyes, lambda points: np.ones(len(points), bool))
+    laid = floor.floor(seen, floor.Settings(spacing_m=0.06))
+    assert len(laid.cloud) - len(seen.cloud) < 40, "each station sees the other's disc"
+    floorless = oriented_box(eyes[:1], lambda points: points[:, 2] > 0.1)
+    assert len(floor.floor(floorless, floor.Settings(spacing_m=0.03)).cloud) == len(floorless.cloud)
