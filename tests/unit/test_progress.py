@@ -16,7 +16,7 @@ def test_the_time_left_falls_stage_by_stage(monkeypatch: pytest.MonkeyPatch) -> 
     clock = [0.0]
     monkeypatch.setattr("tourgen.progress.time.monotonic", lambda: clock[0])
     estimate = Estimate(20.0, STAGES)
-    expected = [estimate.left_s(STAGES[i:]) for i in range(len(STAGES) + 1)]
+    expected = [Estimate(20.0, ahead := STAGES[i:]).left_s(ahead) for i in range(len(STAGES) + 1)]
     assert expected == sorted(expected, reverse=True)
     assert expected[-1] == 0
     assert estimate.done_share(STAGES) == 0
