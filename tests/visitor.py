@@ -149,16 +149,26 @@ def visitor(
     return Visitor(browser.new_context(viewport=view, **context).new_page(), origin)
 
 
-def rays(position: Vector, look_at: Vector, size: tuple[int, int]) -> npt.NDArray[np.float32]:
-    """(h, w, 6) rays through the pixels of the viewer's picture: origins and directions."""
+def rays(
+    position: Vector, look_at: Vector, size: tuple[int, int], beyond_px: int = 0
+) -> npt.NDArray[np.float32]:
+    """(h, w, 6) rays through the pixels of the viewer's picture: origins and directions.
+
+    Args:
+        position: The eye, metres.
+        look_at: In the middle of the picture.
+        size: Width and height, pixels.
+        beyond_px: So many more pixels beyond each edge.
+    """
     width, height = size
     ahead = (look_at - position) / np.linalg.norm(look_at - position)
     right = np.cross(ahead, (0.0, 0.0, 1.0))
     right /= np.linalg.norm(right)
     up = np.cross(right, ahead)
     reach = math.tan(math.radians(UPRIGHT_DEG / 2))
-    x = ((np.arange(width) + 0.5) / width * 2 - 1) * reach * width / height
-    y = (1 - (np.arange(height) + 0.5) / height * 2) * reach
+    column, row = (np.arange(-beyond_px, count + beyond_px) + 0.5 for count in size)
+    x = (column / width * 2 - 1) * reach * width / height
+    y = (1 - row / height * 2) * reach
     directions = ahead + x[None, :, None] * right + y[:, None, None] * up
     origins = np.broadcast_to(position, directions.shape)
     return np.concatenate([origins, directions], axis=2).astype(np.float32)

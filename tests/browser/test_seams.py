@@ -34,6 +34,8 @@ RIM_PX = 4
 OUTLINE = 3
 """Outlines before a true opening may move by so many geometric errors of the coarse tiles, which
 are 95th percentiles; the worst found was 2.5 (the bed's cornice in the miniature)."""
+BEYOND_PX = 40
+"""Openings are known so far beyond the picture's edges."""
 PIXEL_RAD = np.radians(UPRIGHT_DEG) / SIZE[1]
 FLAT_LUMINANCE = 2.0
 """Standard deviation, of 255, below which a picture shows nothing."""
@@ -87,7 +89,7 @@ class TruthRoom:
 
     def void(self, eye: Vector, look_at: Vector, rim_m: float) -> Bools:
         """The pixels in which no surface need be, and those so near to them."""
-        cast = rays(eye, look_at, SIZE)
+        cast = rays(eye, look_at, SIZE, BEYOND_PX)
         hit = self.scene.cast_rays(o3d.core.Tensor(cast))["t_hit"].numpy()
         out = ~np.isfinite(hit)
         for opening in self.doors_and_windows:
@@ -95,7 +97,7 @@ class TruthRoom:
         distance_m = hit * np.linalg.norm(cast[..., 3:], axis=2)
         rim_px = np.maximum(RIM_PX, rim_m / (distance_m * PIXEL_RAD))
         void: Bools = distance_transform_edt(~out) <= rim_px
-        return void
+        return void[BEYOND_PX:-BEYOND_PX, BEYOND_PX:-BEYOND_PX]
 
 
 def through(opening: dict[str, Any], cast: npt.NDArray[np.float32], hit: Vector) -> Bools:
