@@ -10,7 +10,7 @@ looking glass. Two questions, each answered with points spread evenly over the a
 accuracy      How far do points of the mesh lie from the truth? Only points whose nearest
               point of the truth is seen count, and of these only such as do not lie in shadow,
               more than 30 mm behind what every station sees: there the mesh stands for what
-              nobody measured. (`p95_with_shadow` counts those as well.)
+              nobody measured. (`p95_with_shadow_mm` counts those as well.)
 completeness  What share of the seen truth has the mesh within 10 mm?
 """
 
@@ -34,8 +34,8 @@ _PREAMBLE = """# Benchmarks
 Made by `make bench` from the demo. Accuracy: how far the published surface lies from the true
 one, where the nearest true surface is one that a station sees, and not more than 30 mm behind
 what every station sees; `p95_with_shadow_mm` counts what lies there too, where nobody measured
-and the surface only closes the room. Completeness: the share of the
-true surface that a station sees with the published one within 10 mm.
+and the surface only closes the room. Completeness: the share of the true surface that a station
+sees with the published one within 10 mm.
 """
 SAMPLES = 400_000
 PLAY_M = 0.004

@@ -123,9 +123,10 @@ def test_elements_before_and_behind_the_points_are_passed_over(tmp_path, order):
             ("rgb", "u1", 3), ("a", "u1")]
     )  # fmt: skip
     vertex["xy"], vertex["z"], vertex["rgb"] = POINTS[:, :2], POINTS[:, 2], BYTES
-    face = lambda *indices: (  # noqa: E731
-        bytes([len(indices)]) + np.array(indices, mark + "i4").tobytes()
-    )
+
+    def face(*indices: int) -> bytes:
+        return bytes([len(indices)]) + np.array(indices, mark + "i4").tobytes()
+
     body = b"\1" * 18 + face(0, 1, 2) + b"\7" + face(0, 1, 2, 1) + b"\7" + vertex.tobytes()
     (tmp_path / "a.ply").write_bytes(header + body + face(2, 1, 0))
     points, colors = read(tmp_path / "a.ply")

@@ -43,7 +43,7 @@ def truth(score: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> object
 
 
 def test_the_truth_itself_is_perfect(score: ModuleType, truth: object) -> None:
-    figures = score.score(truth.vertices, truth.faces, truth)  # type: ignore[attr-defined]
+    figures = score.score(truth.vertices, truth.faces, truth)
     assert figures["accuracy_p95_mm"] < 0.01
     assert figures["completeness_10mm"] == 1
     blind = np.pi * (1.5 * np.tan(np.radians(30))) ** 2 / (2 * 16 + 4 * 10)
@@ -51,16 +51,16 @@ def test_the_truth_itself_is_perfect(score: ModuleType, truth: object) -> None:
 
 
 def test_a_grown_mesh_is_that_far_off(score: ModuleType, truth: object) -> None:
-    grown = truth.vertices + 0.005 * np.sign(truth.vertices - [0, 0, 1.25])  # type: ignore[attr-defined]
-    figures = score.score(grown, truth.faces, truth)  # type: ignore[attr-defined]
+    grown = truth.vertices + 0.005 * np.sign(truth.vertices - [0, 0, 1.25])
+    figures = score.score(grown, truth.faces, truth)
     assert figures["accuracy_median_mm"] == pytest.approx(5, abs=0.2)
     assert figures["completeness_10mm"] == 1
 
 
 def test_what_is_missing_is_missed(score: ModuleType, truth: object) -> None:
-    middle = truth.vertices[truth.faces].mean(axis=1)  # type: ignore[attr-defined]
-    part = truth.faces[middle[:, 2] < 2.49]  # type: ignore[attr-defined]
-    figures = score.score(truth.vertices, part, truth)  # type: ignore[attr-defined]
+    middle = truth.vertices[truth.faces].mean(axis=1)
+    part = truth.faces[middle[:, 2] < 2.49]
+    figures = score.score(truth.vertices, part, truth)
     seen = 72 - np.pi * (1.5 * np.tan(np.radians(30))) ** 2
     assert figures["completeness_10mm"] == pytest.approx(1 - 16 / seen, abs=0.01)
     assert figures["accuracy_p95_mm"] < 0.01

@@ -87,7 +87,7 @@ def beams(folder: Path) -> tuple[Float64, Float64, Float64]:
     points, _ = ply(folder / "scans" / "small.ply")
     facts, _, station = truth(folder)
     origins, directions = np.empty_like(points), np.empty_like(points)
-    for k, place_ in enumerate(facts["stations"]):  # type: ignore[arg-type, var-annotated]
+    for k, place_ in enumerate(facts["stations"]):
         mine = station == k
         local = (points[mine] - place_["believed_position"]) @ np.array(place_["believed_rotation"])
         directions[mine] = local @ np.array(place_["true_rotation"]).T
@@ -212,7 +212,7 @@ def test_e57_has_stations_rows_columns_and_pictures(scanned: Path) -> None:
         assert file.root["images2D"].childCount() == 3
         for k in range(3):
             header = file.get_header(k)
-            believed = facts["stations"][k]  # type: ignore[index]
+            believed = facts["stations"][k]
             assert header.translation == pytest.approx(believed["believed_position"])
             data = file.read_scan(k, colors=True, row_column=True, ignore_missing_fields=True)
             found.append(np.stack([data[f"cartesian{a}"] for a in "XYZ"], axis=1))

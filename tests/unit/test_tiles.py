@@ -34,7 +34,7 @@ def border(mesh: Mesh) -> set[tuple[bytes, bytes]]:
     edge = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     once, uses = np.unique(edge, axis=0, return_counts=True)
     at = [v.tobytes() for v in mesh.vertices]
-    return {tuple(sorted((at[a], at[b]))) for a, b in once[uses == 1]}  # type: ignore[misc]
+    return {tuple(sorted((at[a], at[b]))) for a, b in once[uses == 1]}
 
 
 def test_the_tree_is_whole(room: tuple[Tile, ...]) -> None:

@@ -1,8 +1,8 @@
 """Poster: what a visitor sees on entering, rendered by ray casting, without GPU or browser.
 
 Rays through Embree (Open3D's RaycastingScene) at twice the size each way, the pictures of the
-tiles read with bilinear blending, four rays averaged a pixel. Faces are
-seen from both sides, as in the viewer.
+tiles read with bilinear blending, four rays averaged a pixel. Faces are seen
+from both sides, as in the viewer.
 """
 
 from __future__ import annotations
