@@ -1,0 +1,125 @@
+"""Stations of different exposure come to one; glare gives way to what other stations saw."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tourgen.geometry import PointCloud
+from tourgen.stages.exposure import Settings, exposure, gains, solve_gains
+
+GAINS = np.array([[1.06, 1.02, 0.97], [0.95, 0.99, 1.01], [0.94, 1.05, 1.03]])
+STATIONS = np.array([[-1.0, 0.0, 1.5], [1.0, 0.0, 1.5], [0.0, 1.0, 1.5]])
+
+
+def painted(places: np.ndarray) -> np.ndarray:
+    """A floor of uneven colours, 40 to 200."""
+    waves = np.stack(
+        [np.sin(7 * places[:, 0]), np.cos(5 * places[:, 1]), np.sin(3 * places.sum(1))]
+    )
+    return 120 + 80 * waves.T
+
+
+def wall(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    places = np.column_stack([rng.random((count, 2)) * 2, np.zeros(count)])
+    return places.astype(np.float32), rng.integers(0, 3, count).astype(np.int16)
+
+
+def cloud_of(places: np.ndarray, colors: np.ndarray, station: np.ndarray) -> PointCloud:
+    shown = np.clip(np.rint(colors), 0, 255).astype(np.uint8)
+    return PointCloud(np.zeros(3), places, shown, station)
+
+
+def exposed_wall(count: int = 60_000) -> PointCloud:
+    places, station = wall(count)
+    return cloud_of(places, painted(places) * GAINS[station], station)
+
+
+def test_gains_come_out_up_to_a_common_factor() -> None:
+    cloud = exposed_wall()
+    found = gains(cloud.points, cloud.colors, cloud.station, 3, Settings())
+    expected = GAINS / np.exp(np.log(GAINS).mean(0))
+    assert np.abs(found / expected - 1).max() < 0.002
+
+
+def test_a_passer_by_and_saturation_do_not_pull_the_gains() -> None:
+    places, station = wall(60_000)
+    colors = painted(places) * GAINS[station]
+    colors[(station == 0) & (places[:, 0] < 0.4)] = (20, 30, 90)  # somebody in front of a fifth
+    colors[places[:, 1] > 1.5] *= 1.9  # clipped in part
+    cloud = cloud_of(places, colors, station)
+    found = gains(cloud.points, cloud.colors, cloud.station, 3, Settings())
+    assert np.abs(found / (GAINS / np.exp(np.log(GAINS).mean(0))) - 1).max() < 0.004
+
+
+def test_colours_of_all_stations_agree_after_it() -> None:
+    even = exposure(exposed_wall(), STATIONS, Settings())
+    off = even.colors - painted(even.points) / np.exp(-np.log(GAINS).mean(0))
+    by_station = np.array([off[even.station == k].mean(0) for k in range(3)])
+    assert np.ptp(by_station, axis=0).max() < 0.5
+    assert np.abs(off).max() < 2.5
+
+
+def test_one_bad_pair_among_many_is_outvoted() -> None:
+    pairs = np.array([(a, b) for a in range(5) for b in range(a)])
+    true = np.linspace(-0.1, 0.1, 5)
+    ratio = np.repeat((true[pairs[:, 0]] - true[pairs[:, 1]])[:, None], 3, axis=1)
+    ratio[3] += 0.2
+    found = solve_gains(pairs, ratio, np.full_like(ratio, 0.001), 5)
+    assert np.abs(np.log(found) - true[:, None]).max() < 0.003
+
+
+def test_groups_of_stations_that_see_nothing_in_common_keep_their_own_mean() -> None:
+    pairs = np.array([[0, 1], [2, 3]])
+    found = solve_gains(pairs, np.array([[0.1] * 3, [0.2] * 3]), np.full((2, 3), 0.001), 5)
+    assert found[:, 0] == pytest.approx(np.exp([0.05, -0.05, 0.1, -0.1, 0.0]))
+
+
+def test_glare_gives_way_to_a_station_that_is_not_dazzled() -> None:
+    """A lamp hangs before the wall; each station sees it in front of another place."""
+    places, station = wall(200_000)
+    lamp = np.array([1.0, 1.0, 0.8])
+    stations = np.array([[0.0, 1.0, 1.6], [2.0, 1.0, 1.6], [1.0, 0.0, 1.6]])
+    rng = np.random.default_rng(4)
+    globe = rng.normal(size=(3000, 3))
+    places = np.concatenate([places, lamp + 0.1 * globe / np.linalg.norm(globe, axis=1)[:, None]])
+    station = np.concatenate([station, rng.integers(0, 3, 3000).astype(np.int16)])
+    clean = painted(places)
+    clean[-3000:] = 255
+    way = places - stations[station]
+    toward = lamp - stations[station]
+    lengths = np.linalg.norm(way, axis=1) * np.linalg.norm(toward, axis=1)
+    angle = np.degrees(np.arccos(np.clip((way * toward).sum(1) / lengths, -1, 1)))
+    dazzled = clean + 340 * np.exp(-((angle / 4) ** 2))[:, None]
+    cloud = cloud_of(places.astype(np.float32), dazzled, station)
+    even = exposure(cloud, stations, Settings())
+    on_wall = even.points[:, 2] == 0
+    off = np.abs(even.colors[on_wall] - painted(even.points[on_wall])).max(1)
+    assert (np.abs(dazzled - clean).max(1) > 40).sum() > 3000
+    assert (off > 40).sum() < 30
+    assert on_wall.sum() > 180_000
+    assert (~on_wall).sum() == 3000  # the lamp itself shines for every station
+
+
+@pytest.mark.parametrize("owner", [-1, 0])
+def test_a_cloud_of_unknown_or_of_one_station_stays_as_it_is(owner: int) -> None:
+    places, _ = wall(5000)
+    cloud = cloud_of(places, painted(places), np.full(5000, owner, np.int16))
+    stations = STATIONS[: owner + 1]
+    assert np.array_equal(exposure(cloud, stations, Settings()).colors, cloud.colors)
+
+
+def test_stations_without_common_places_keep_their_gains() -> None:
+    places, _ = wall(5000)
+    station = (places[:, 0] > 1).astype(np.int16)
+    gap = np.abs(places[:, 0] - 1) > 0.1
+    cloud = cloud_of(places[gap], painted(places[gap]), station[gap])
+    assert np.array_equal(exposure(cloud, STATIONS[:2], Settings()).colors, cloud.colors)
+
+
+def test_an_empty_cloud_is_no_fault() -> None:
+    none = PointCloud(
+        np.zeros(3), np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8), np.zeros(0, np.int16)
+    )
+    assert len(exposure(none, np.zeros((0, 3)), Settings())) == 0
