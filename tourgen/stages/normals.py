@@ -1,4 +1,4 @@
-"""Normals: PCA of each neighbourhood, turned toward the free space of the room.
+"""Normals: a robust plane of each neighbourhood, turned toward the free space of the room.
 
 Orientation, best evidence first:
 
@@ -21,9 +21,10 @@ from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, OrientedCloud, PointCloud
 from tourgen.stages.sight import depth_buffer
+from tourgen.stages.tangent import tangent_planes
 from tourgen.stages.thin import voxel_groups
 
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +32,14 @@ class Settings:
     """How wide to look.
 
     Attributes:
-        neighbours: Points that make a tangent plane.
+        first_neighbours: Points of the small first fit of a tangent plane.
+        neighbours: Points that the wide, robust fit chooses from.
         sight_cell_deg: Cell of the depth buffers that decide which station sees a point.
         tree_points: Most points that the spanning tree is grown on.
     """
 
-    neighbours: int = 10
+    first_neighbours: int = 12
+    neighbours: int = 48
     sight_cell_deg: float = 0.5
     tree_points: int = 40_000
 
@@ -52,7 +55,7 @@ def normals(cloud: PointCloud, stations: Float64, settings: Settings) -> Oriente
     Returns:
         The same points with unit normals toward the free space.
     """
-    normal = _tangent_planes(cloud.points, settings.neighbours)
+    normal = tangent_planes(cloud.points, settings.first_neighbours, settings.neighbours)
     if len(stations) and np.all(cloud.station >= 0):
         _look_at(normal, cloud.points, stations[cloud.station])
     elif len(stations):
@@ -61,14 +64,6 @@ def normals(cloud: PointCloud, stations: Float64, settings: Settings) -> Oriente
     else:
         _spanning_tree(normal, cloud.points, settings)
     return OrientedCloud(cloud, normal, stations)
-
-
-def _tangent_planes(points: Float32, neighbours: int) -> Float32:
-    import open3d as o3d
-
-    pcd = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    pcd.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(neighbours))
-    return np.asarray(pcd.normals).astype(np.float32)
 
 
 def _look_at(normal: Float32, points: Float32, target: Float64) -> None:
@@ -114,7 +109,7 @@ def _spanning_tree(normal: Float32, points: Float32, settings: Settings) -> None
         order, starts = voxel_groups(points, voxel_m)
     sparse = order[starts]
     pcd = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points[sparse]))
-    pcd.normals = o3d.utility.Vector3dVector(_tangent_planes(points[sparse], 12))
+    pcd.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(12))
     pcd.orient_normals_consistent_tangent_plane(12)
     grown = np.asarray(pcd.normals).astype(np.float32)
     inward = np.median(points[sparse], axis=0) - points[sparse]
