@@ -1,0 +1,207 @@
+"""The peers: what other programs make of the same scan, each by its own documented recipe.
+
+Every peer gets the scan that tourgen gets, cropped to the same boxes of tour.toml. Each then
+drops outliers with its own filter and finds normals with its own; the normals are turned towards
+the nearest true station, which is more than a merged scan tells and than either program can do
+by itself. Poisson's invented surface is cut by density, as both manuals advise. A peer's score
+in a room is that of the best of its settings there.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rooms import BenchRoom
+
+from tourgen.geometry import Float32, Float64, Int32
+
+VERSION = 1
+"""Raised when a recipe changes, so that cached meshes are made again."""
+
+Mesh = tuple[Float64, Int32]
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One setting of one program.
+
+    Attributes:
+        program: Its name in the tables.
+        setting: In words.
+        make: (cloud's points, stations) -> mesh.
+    """
+
+    program: str
+    setting: str
+    make: Callable[[Float32, Float64], Mesh]
+
+    @property
+    def file_name(self) -> str:
+        """Of its cached mesh."""
+        words = f"{self.program} {self.setting}".lower()
+        return "-".join("".join(c if c.isalnum() else " " for c in words).split())
+
+
+@dataclass(frozen=True)
+class Open3dPoisson:
+    """Open3D's tutorials "Point cloud outlier removal" and "Surface reconstruction".
+
+    Attributes:
+        depth: Of the octree.
+        cut: This share of the vertices, the thinnest supported, is dropped.
+    """
+
+    depth: int
+    cut: float
+
+    def __call__(self, points: Float32, stations: Float64) -> Mesh:
+        """Statistical outliers (20 neighbours, 2 deviations), normals of 30, Poisson, cut."""
+        import open3d as o3d
+
+        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points.astype(np.float64)))
+        cloud, _ = cloud.remove_statistical_outlier(nb_neighbors=20, std_ratio=2.0)
+        cloud.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(radius=0.1, max_nn=30))
+        turned = toward_stations(np.asarray(cloud.points), np.asarray(cloud.normals), stations)
+        cloud.normals = o3d.utility.Vector3dVector(turned)
+        mesh, density = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
+            cloud, depth=self.depth, linear_fit=False
+        )
+        thin = np.asarray(density)
+        mesh.remove_vertices_by_mask(thin < np.quantile(thin, self.cut))
+        return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
+
+
+@dataclass(frozen=True)
+class MeshlabPoisson:
+    """MeshLab's screened Poisson.
+
+    Attributes:
+        depth: Of the octree.
+        cut: This share of the vertices, the thinnest supported, is dropped.
+    """
+
+    depth: int
+    cut: float
+
+    def __call__(self, points: Float32, stations: Float64) -> Mesh:
+        """Outliers by local probability (32 neighbours, 0.8), normals of 16, Poisson, cut."""
+        meshes = _meshlab_cloud(points, stations)
+        meshes.generate_surface_reconstruction_screened_poisson(depth=self.depth, preclean=True)
+        density = meshes.current_mesh().vertex_scalar_array()
+        least = float(np.quantile(density, self.cut))
+        meshes.compute_selection_by_condition_per_vertex(condselect=f"q < {least!r}")
+        meshes.meshing_remove_selected_vertices()
+        return _of_meshlab(meshes)
+
+
+@dataclass(frozen=True)
+class MeshlabBallPivoting:
+    """MeshLab's ball pivoting on an evenly thinned cloud, as its manual advises for dense scans.
+
+    Attributes:
+        apart_mm: Points closer together are merged.
+        radii_mm: Of the balls, one after the other; none: as MeshLab guesses.
+    """
+
+    apart_mm: float
+    radii_mm: tuple[float, ...]
+
+    def __call__(self, points: Float32, stations: Float64) -> Mesh:
+        """Outliers by local probability (32 neighbours, 0.8), normals of 16, thinning, balls."""
+        import pymeshlab
+
+        meshes = _meshlab_cloud(points, stations)
+        meshes.generate_sampling_clustered_vertex(
+            threshold=pymeshlab.PureValue(self.apart_mm / 1000), sampling="Closest to center"
+        )
+        for radius_mm in self.radii_mm or (0.0,):
+            meshes.generate_surface_reconstruction_ball_pivoting(
+                ballradius=pymeshlab.PureValue(radius_mm / 1000)
+            )
+        return _of_meshlab(meshes)
+
+
+def _meshlab_cloud(points: Float32, stations: Float64) -> Any:
+    """A MeshSet with the cloud, without outliers, with normals."""
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=points.astype(np.float64)))
+    meshes.compute_selection_point_cloud_outliers(propthreshold=0.8, knearest=32)
+    meshes.meshing_remove_selected_vertices()
+    meshes.compute_normal_for_point_clouds(k=16)
+    found = meshes.current_mesh()
+    kept, normals = found.vertex_matrix(), found.vertex_normal_matrix()
+    turned = toward_stations(kept, normals, stations)
+    meshes.clear()
+    meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=kept, v_normals_matrix=turned))
+    return meshes
+
+
+def _of_meshlab(meshes: Any) -> Mesh:
+    mesh = meshes.current_mesh()
+    return mesh.vertex_matrix(), mesh.face_matrix()
+
+
+def toward_stations(points: Float64, normals: Float64, stations: Float64) -> Float64:
+    """The normals, each turned towards the station nearest to its point."""
+    from scipy.spatial import cKDTree
+
+    nearest = cKDTree(stations).query(points)[1]
+    away = ((stations[nearest] - points) * normals).sum(axis=1) < 0
+    turned: Float64 = np.where(away[:, None], -normals, normals)
+    return turned
+
+
+OPEN3D_POISSON, MESHLAB_POISSON = "Open3D Poisson", "PyMeshLab Poisson"
+MESHLAB_BALLS = "PyMeshLab ball pivoting"
+
+ATTEMPTS = (
+    Attempt(OPEN3D_POISSON, "depth 9, cut 1 %", Open3dPoisson(9, 0.01)),
+    Attempt(OPEN3D_POISSON, "depth 10, cut 5 %", Open3dPoisson(10, 0.05)),
+    Attempt(OPEN3D_POISSON, "depth 11, cut 5 %", Open3dPoisson(11, 0.05)),
+    Attempt(MESHLAB_POISSON, "depth 9, cut 1 %", MeshlabPoisson(9, 0.01)),
+    Attempt(MESHLAB_POISSON, "depth 10, cut 5 %", MeshlabPoisson(10, 0.05)),
+    Attempt(MESHLAB_POISSON, "depth 11, cut 5 %", MeshlabPoisson(11, 0.05)),
+    Attempt(MESHLAB_BALLS, "5 mm apart, radius guessed", MeshlabBallPivoting(5, ())),
+    Attempt(MESHLAB_BALLS, "6 mm apart, 10 mm", MeshlabBallPivoting(6, (10,))),
+    Attempt(MESHLAB_BALLS, "8 mm apart, 12 and 25 mm", MeshlabBallPivoting(8, (12, 25))),
+)
+
+
+def made(attempt: Attempt, room: BenchRoom, scratch: Path) -> Path:
+    """The mesh of one attempt, made in a process of its own unless it is there.
+
+    Returns:
+        An ``.npz`` with ``vertices``, ``faces`` and ``seconds``.
+    """
+    digest = f"{room.scan.stat().st_size}-{room.scan.stat().st_mtime_ns}"
+    name = f"{attempt.file_name}-v{VERSION}-{digest}.npz"
+    file = scratch / "peers" / room.id / name
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        spawn = multiprocessing.get_context("spawn")
+        worker = spawn.Process(target=_make, args=(attempt, room, file))
+        worker.start()
+        worker.join()
+        if worker.exitcode:
+            raise RuntimeError(f"{attempt.program} ({attempt.setting}) died on {room.id}")
+    return file
+
+
+def _make(attempt: Attempt, room: BenchRoom, file: Path) -> None:
+    points, _ = room.cloud()
+    begun = time.perf_counter()
+    vertices, faces = attempt.make(points, room.stations())
+    seconds = time.perf_counter() - begun
+    aside = file.with_name(f".{file.name}")
+    np.savez(
+        aside, vertices=vertices.astype(np.float32), faces=faces.astype(np.int32), seconds=seconds
+    )
+    aside.rename(file)

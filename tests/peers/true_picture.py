@@ -1,0 +1,244 @@
+"""What a room truly looks like from a camera, and which pixels are judged."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from rooms import BenchRoom
+
+from tourgen.geometry import Float32, Float64, Int32, UInt8
+from tourgen.simulation.atlas import sample
+from tourgen.simulation.light import ray_scene
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from visitor import rays
+
+VERSION = 1
+"""Raised when cameras or rendering change, so that stored pictures are made again."""
+SIZE = (960, 540)
+CAMERAS = 10
+FINENESS = 3
+"""Rays a pixel along each axis."""
+CLEARANCE_M = 0.45
+EYE_M = 1.6
+INSIDE_SHARE = 0.75
+"""So many of the directions about an eye must end on a surface."""
+VIEW_M = 0.9
+"""A camera's median distance to what it sees is at least this."""
+RIM_PX = 2
+"""What is masked is masked so much wider: edges of glass are a matter of half pixels."""
+LAMP_SPARE_M = 0.03
+_ROWS_AT_ONCE = 90
+_SHOT = ("picture", "judged", "depth_m")
+
+Bools = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """An eye and what it looks at, metres."""
+
+    position: Float64
+    look_at: Float64
+
+
+@dataclass(frozen=True)
+class Shot:
+    """What a camera truly sees.
+
+    Attributes:
+        picture: (h, w, 3) uint8, sRGB.
+        judged: (h, w) neither glass, void, mirror nor lamp.
+        depth_m: (h, w) along the ray through the pixel's middle, infinite in the void.
+    """
+
+    picture: UInt8
+    judged: Bools
+    depth_m: Float64
+
+
+class TexturedTruth:
+    """The true surface with its picture."""
+
+    def __init__(self, room: BenchRoom) -> None:
+        from PIL import Image
+
+        Image.MAX_IMAGE_PIXELS = None
+        surface = room.truth_folder / f"{room.id}.ply"
+        self.digest = hashlib.sha256(surface.read_bytes()).hexdigest()[:12]
+        self.vertices, self.uv, self.faces = read_textured(surface)
+        self.texture = np.asarray(
+            Image.open(room.truth_folder / f"{room.id}.png").convert("RGB"), np.uint8
+        )
+        self.facts = room.facts()
+        self.scene = ray_scene(self.vertices, self.faces)
+        self._is_mirror = np.zeros(len(self.faces), dtype=np.bool_)
+        self._is_mirror[self.facts["mirror_faces"]] = True
+        middle = self.vertices[self.faces].mean(axis=1)
+        self._is_lamp = np.zeros(len(self.faces), dtype=np.bool_)
+        for lamp in self.facts["lamps"]:
+            away = np.linalg.norm(middle - np.array(lamp["position"]), axis=1)
+            self._is_lamp |= away < lamp["radius_m"] + LAMP_SPARE_M
+
+    @cached_property
+    def cameras(self) -> tuple[Camera, ...]:
+        """Ten places where one can stand, each with a direction to look; always the same."""
+        found: list[Camera] = []
+        for camera in self._tries():
+            reach = self._reach(rays(camera.position, camera.look_at, (48, 27)))
+            if np.isfinite(reach).mean() > INSIDE_SHARE and np.median(reach) > VIEW_M:
+                found.append(camera)
+            if len(found) == CAMERAS:
+                break
+        return tuple(found)
+
+    def _tries(self) -> Iterator[Camera]:
+        rng = np.random.default_rng(11)
+        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        while True:
+            eye = rng.uniform(low, high)
+            turn, tilt = rng.uniform(0, 2 * np.pi), rng.uniform(-0.6, 0.35)
+            down = self._reach(np.array([[*eye, 0, 0, -1]], np.float32))[0]
+            if not np.isfinite(down):
+                continue
+            eye[2] += EYE_M - down
+            if self._clearance(eye) < CLEARANCE_M or not self._inside(eye):
+                continue
+            ahead = [np.cos(turn) * np.cos(tilt), np.sin(turn) * np.cos(tilt), np.sin(tilt)]
+            yield Camera(eye, eye + ahead)
+
+    def _reach(self, cast: Float32) -> Float64:
+        reach: Float64 = self.scene.cast_rays(_tensor(cast))["t_hit"].numpy()
+        return reach * np.linalg.norm(cast[..., 3:], axis=-1)
+
+    def _clearance(self, place: Float64) -> float:
+        return float(self.scene.compute_distance(_tensor(place[None])).numpy()[0])
+
+    def _inside(self, place: Float64) -> bool:
+        directions = np.random.default_rng(1).normal(size=(300, 3))
+        origins = np.broadcast_to(place, directions.shape)
+        reach = self._reach(np.concatenate([origins, directions], axis=1).astype(np.float32))
+        return bool(np.isfinite(reach).mean() > INSIDE_SHARE)
+
+    def shot(self, camera: Camera, size: tuple[int, int] = SIZE) -> Shot:
+        """Render a camera's picture with ``FINENESS`` squared rays a pixel."""
+        width, height = size
+        fine = rays(camera.position, camera.look_at, (width * FINENESS, height * FINENESS))
+        light = np.zeros((height, width, 3), np.float32)
+        for top in range(0, height, _ROWS_AT_ONCE):
+            part = slice(top * FINENESS, (top + _ROWS_AT_ONCE) * FINENESS)
+            light[top : top + _ROWS_AT_ONCE] = _pooled(_LIGHT[self._colors(fine[part])])
+        coarse = rays(camera.position, camera.look_at, size)
+        masked, depth_m = self._masked(coarse)
+        return Shot(encoded(light), ~_grown(masked, RIM_PX), depth_m)
+
+    def _colors(self, cast: Float32) -> UInt8:
+        """(h, w, 3) what each of (h, w) rays meets, black in the void."""
+        answer = self.scene.cast_rays(_tensor(cast))
+        found = np.isfinite(answer["t_hit"].numpy())
+        face = answer["primitive_ids"].numpy()[found].astype(np.int64)
+        share = answer["primitive_uvs"].numpy()[found]
+        uv = self.uv[self.faces[face]]
+        at = uv[:, 0] * (1 - share.sum(axis=1))[:, None]
+        at += uv[:, 1] * share[:, :1] + uv[:, 2] * share[:, 1:]
+        colors = np.zeros((*found.shape, 3), np.uint8)
+        colors[found] = sample(self.texture, at)
+        return colors
+
+    def _masked(self, cast: Float32) -> tuple[Bools, Float64]:
+        """(h, w) what is not judged, and how far it is."""
+        answer = self.scene.cast_rays(_tensor(cast))
+        reach = answer["t_hit"].numpy()
+        found = np.isfinite(reach)
+        face = np.where(found, answer["primitive_ids"].numpy(), 0).astype(np.int64)
+        masked = ~found | self._is_mirror[face] | self._is_lamp[face]
+        for opening in self.facts["openings"]:
+            masked |= _through(opening, cast, reach)
+        return masked, reach * np.linalg.norm(cast[..., 3:], axis=-1)
+
+
+def read_textured(path: Path) -> tuple[Float64, Float32, Int32]:
+    """Vertices (v, 3), uv (v, 2) with (0, 0) in the upper left corner, and faces (f, 3)."""
+    data = path.read_bytes()
+    end = data.index(b"end_header\n") + len(b"end_header\n")
+    counts = [
+        int(line.split()[2]) for line in data[:end].splitlines() if line.startswith(b"element")
+    ]
+    vertex = np.frombuffer(data, [("xyz", "<f4", 3), ("st", "<f4", 2)], counts[0], end)
+    face = np.frombuffer(data, [("n", "u1"), ("v", "<i4", 3)], counts[1], end + vertex.nbytes)
+    uv = vertex["st"].copy()
+    uv[:, 1] = 1 - uv[:, 1]
+    return vertex["xyz"].astype(np.float64), uv, face["v"].astype(np.int32)
+
+
+_LIGHT = np.arange(256) / 255
+_LIGHT = np.where(_LIGHT <= 0.04045, _LIGHT / 12.92, ((_LIGHT + 0.055) / 1.055) ** 2.4)
+_LIGHT = _LIGHT.astype(np.float32)
+"""Of each sRGB value."""
+
+
+def encoded(light: Float32) -> UInt8:
+    """sRGB values of light 0 to 1."""
+    c = np.where(
+        light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 0) ** (1 / 2.4) - 0.055
+    )
+    values: UInt8 = np.clip(np.rint(c * 255), 0, 255).astype(np.uint8)
+    return values
+
+
+def _pooled(fine: Float32) -> Float32:
+    """(h, w, 3) the mean of each block of ``FINENESS`` squared."""
+    height, width = fine.shape[0] // FINENESS, fine.shape[1] // FINENESS
+    pooled: Float32 = fine.reshape(height, FINENESS, width, FINENESS, 3).mean(axis=(1, 3))
+    return pooled
+
+
+def _grown(mask: Bools, by_px: int) -> Bools:
+    from scipy.ndimage import binary_dilation
+
+    grown: Bools = binary_dilation(mask, iterations=by_px)
+    return grown
+
+
+def _through(opening: dict[str, Any], cast: Float32, hit: Float64) -> Bools:
+    """Whether rays pass the pane of an opening, which lies deep in the wall, before they hit."""
+    centre, right, up, outward = (
+        np.array(opening[key]) for key in ("center", "right", "up", "outward")
+    )
+    origin, direction = cast[..., :3].astype(np.float64), cast[..., 3:].astype(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = (centre - origin) @ outward / (direction @ outward)
+        at = origin + reach[..., None] * direction - centre
+    beside = np.abs(at @ right) / (opening["width"] / 2)
+    above = np.abs(at @ up) / (opening["height"] / 2)
+    rim = np.hypot(beside, above) if opening["kind"] == "porthole" else np.maximum(beside, above)
+    passed: Bools = (rim <= 1) & (reach > 0) & (direction @ outward > 0) & (reach < hit)
+    return passed
+
+
+def _tensor(array: npt.NDArray[Any]) -> Any:
+    import open3d as o3d
+
+    return o3d.core.Tensor(np.ascontiguousarray(array, dtype=np.float32))
+
+
+def true_shots(room: BenchRoom, truth: TexturedTruth, scratch: Path) -> list[Shot]:
+    """What the room's cameras see, rendered once for each truth."""
+    file = scratch / "shots" / f"{room.id}-v{VERSION}-{truth.digest}.npz"
+    if not file.exists():
+        shots = [truth.shot(camera) for camera in truth.cameras]
+        file.parent.mkdir(parents=True, exist_ok=True)
+        aside = file.with_name(f".{file.name}")
+        columns = {name: np.stack([getattr(s, name) for s in shots]) for name in _SHOT}
+        np.savez_compressed(aside, **columns)
+        aside.rename(file)
+    with np.load(file) as stored:
+        return [Shot(*each) for each in zip(*(stored[name] for name in _SHOT), strict=True)]
