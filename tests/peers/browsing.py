@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
 
-from true_picture import SIZE, Camera
+from drawing import SIZE, Camera
 
 from tourgen.doctor import browser as find_browser
 from tourgen.geometry import UInt8

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,21 +11,15 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from drawing import SIZE, Camera, draw, tensor, textured
 from rooms import BenchRoom
 
 from tourgen.geometry import Float32, Float64, Int32, UInt8
-from tourgen.simulation.atlas import sample
 from tourgen.simulation.light import ray_scene
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from visitor import rays
 
 VERSION = 1
 """Raised when cameras or rendering change, so that stored pictures are made again."""
-SIZE = (960, 540)
 CAMERAS = 10
-FINENESS = 3
-"""Rays a pixel along each axis."""
 CLEARANCE_M = 0.45
 EYE_M = 1.6
 INSIDE_SHARE = 0.75
@@ -36,18 +29,9 @@ VIEW_M = 0.9
 RIM_PX = 2
 """What is masked is masked so much wider: edges of glass are a matter of half pixels."""
 LAMP_SPARE_M = 0.03
-_ROWS_AT_ONCE = 90
 _SHOT = ("picture", "judged", "depth_m")
 
 Bools = npt.NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Camera:
-    """An eye and what it looks at, metres."""
-
-    position: Float64
-    look_at: Float64
 
 
 @dataclass(frozen=True)
@@ -78,6 +62,7 @@ class TexturedTruth:
         self.texture = np.asarray(
             Image.open(room.truth_folder / f"{room.id}.png").convert("RGB"), np.uint8
         )
+        self._colors_at = textured(self.uv, self.faces, self.texture)
         self.facts = room.facts()
         self.scene = ray_scene(self.vertices, self.faces)
         self._is_mirror = np.zeros(len(self.faces), dtype=np.bool_)
@@ -93,7 +78,7 @@ class TexturedTruth:
         """Ten places where one can stand, each with a direction to look; always the same."""
         found: list[Camera] = []
         for camera in self._tries():
-            reach = self._reach(rays(camera.position, camera.look_at, (48, 27)))
+            reach = self._reach(camera.rays((48, 27)))
             if np.isfinite(reach).mean() > INSIDE_SHARE and np.median(reach) > VIEW_M:
                 found.append(camera)
             if len(found) == CAMERAS:
@@ -116,11 +101,11 @@ class TexturedTruth:
             yield Camera(eye, eye + ahead)
 
     def _reach(self, cast: Float32) -> Float64:
-        reach: Float64 = self.scene.cast_rays(_tensor(cast))["t_hit"].numpy()
+        reach: Float64 = self.scene.cast_rays(tensor(cast))["t_hit"].numpy()
         return reach * np.linalg.norm(cast[..., 3:], axis=-1)
 
     def _clearance(self, place: Float64) -> float:
-        return float(self.scene.compute_distance(_tensor(place[None])).numpy()[0])
+        return float(self.scene.compute_distance(tensor(place[None])).numpy()[0])
 
     def _inside(self, place: Float64) -> bool:
         directions = np.random.default_rng(1).normal(size=(300, 3))
@@ -128,34 +113,15 @@ class TexturedTruth:
         reach = self._reach(np.concatenate([origins, directions], axis=1).astype(np.float32))
         return bool(np.isfinite(reach).mean() > INSIDE_SHARE)
 
-    def shot(self, camera: Camera, size: tuple[int, int] = SIZE) -> Shot:
-        """Render a camera's picture with ``FINENESS`` squared rays a pixel."""
-        width, height = size
-        fine = rays(camera.position, camera.look_at, (width * FINENESS, height * FINENESS))
-        light = np.zeros((height, width, 3), np.float32)
-        for top in range(0, height, _ROWS_AT_ONCE):
-            part = slice(top * FINENESS, (top + _ROWS_AT_ONCE) * FINENESS)
-            light[top : top + _ROWS_AT_ONCE] = _pooled(_LIGHT[self._colors(fine[part])])
-        coarse = rays(camera.position, camera.look_at, size)
-        masked, depth_m = self._masked(coarse)
-        return Shot(encoded(light), ~_grown(masked, RIM_PX), depth_m)
-
-    def _colors(self, cast: Float32) -> UInt8:
-        """(h, w, 3) what each of (h, w) rays meets, black in the void."""
-        answer = self.scene.cast_rays(_tensor(cast))
-        found = np.isfinite(answer["t_hit"].numpy())
-        face = answer["primitive_ids"].numpy()[found].astype(np.int64)
-        share = answer["primitive_uvs"].numpy()[found]
-        uv = self.uv[self.faces[face]]
-        at = uv[:, 0] * (1 - share.sum(axis=1))[:, None]
-        at += uv[:, 1] * share[:, :1] + uv[:, 2] * share[:, 1:]
-        colors = np.zeros((*found.shape, 3), np.uint8)
-        colors[found] = sample(self.texture, at)
-        return colors
+    def shot(self, camera: Camera) -> Shot:
+        """What a camera sees, and what of it is judged."""
+        picture = draw(self.scene, self._colors_at, camera, void=(0, 0, 0))
+        masked, depth_m = self._masked(camera.rays(SIZE))
+        return Shot(picture, ~_grown(masked, RIM_PX), depth_m)
 
     def _masked(self, cast: Float32) -> tuple[Bools, Float64]:
         """(h, w) what is not judged, and how far it is."""
-        answer = self.scene.cast_rays(_tensor(cast))
+        answer = self.scene.cast_rays(tensor(cast))
         reach = answer["t_hit"].numpy()
         found = np.isfinite(reach)
         face = np.where(found, answer["primitive_ids"].numpy(), 0).astype(np.int64)
@@ -179,28 +145,6 @@ def read_textured(path: Path) -> tuple[Float64, Float32, Int32]:
     return vertex["xyz"].astype(np.float64), uv, face["v"].astype(np.int32)
 
 
-_LIGHT = np.arange(256) / 255
-_LIGHT = np.where(_LIGHT <= 0.04045, _LIGHT / 12.92, ((_LIGHT + 0.055) / 1.055) ** 2.4)
-_LIGHT = _LIGHT.astype(np.float32)
-"""Of each sRGB value."""
-
-
-def encoded(light: Float32) -> UInt8:
-    """sRGB values of light 0 to 1."""
-    c = np.where(
-        light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 0) ** (1 / 2.4) - 0.055
-    )
-    values: UInt8 = np.clip(np.rint(c * 255), 0, 255).astype(np.uint8)
-    return values
-
-
-def _pooled(fine: Float32) -> Float32:
-    """(h, w, 3) the mean of each block of ``FINENESS`` squared."""
-    height, width = fine.shape[0] // FINENESS, fine.shape[1] // FINENESS
-    pooled: Float32 = fine.reshape(height, FINENESS, width, FINENESS, 3).mean(axis=(1, 3))
-    return pooled
-
-
 def _grown(mask: Bools, by_px: int) -> Bools:
     from scipy.ndimage import binary_dilation
 
@@ -222,12 +166,6 @@ def _through(opening: dict[str, Any], cast: Float32, hit: Float64) -> Bools:
     rim = np.hypot(beside, above) if opening["kind"] == "porthole" else np.maximum(beside, above)
     passed: Bools = (rim <= 1) & (reach > 0) & (direction @ outward > 0) & (reach < hit)
     return passed
-
-
-def _tensor(array: npt.NDArray[Any]) -> Any:
-    import open3d as o3d
-
-    return o3d.core.Tensor(np.ascontiguousarray(array, dtype=np.float32))
 
 
 def true_shots(room: BenchRoom, truth: TexturedTruth, scratch: Path) -> list[Shot]:
