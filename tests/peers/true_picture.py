@@ -62,7 +62,7 @@ class TexturedTruth:
         self.texture = np.asarray(
             Image.open(room.truth_folder / f"{room.id}.png").convert("RGB"), np.uint8
         )
-        self._colors_at = textured(self.uv, self.faces, self.texture)
+        self.colors_at = textured(self.uv, self.faces, self.texture)
         self.facts = room.facts()
         self.scene = ray_scene(self.vertices, self.faces)
         self._is_mirror = np.zeros(len(self.faces), dtype=np.bool_)
@@ -115,7 +115,7 @@ class TexturedTruth:
 
     def shot(self, camera: Camera) -> Shot:
         """What a camera sees, and what of it is judged."""
-        picture = draw(self.scene, self._colors_at, camera, void=(0, 0, 0))
+        picture = draw(self.scene, self.colors_at, camera, void=(0, 0, 0))
         masked, depth_m = self._masked(camera.rays(SIZE))
         return Shot(picture, ~_grown(masked, RIM_PX), depth_m)
 
