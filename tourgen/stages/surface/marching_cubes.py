@@ -1,0 +1,216 @@
+"""Marching cubes over the cells of a sparse grid (Lorensen and Cline 1987).
+
+The published table leaves holes where two cells cut the face between them in different ways.
+Here the table is made, not typed: on every face of the cube the surface cuts off the corners in
+front of it, each alone, so that both cells of a face agree whatever lies around (the rule of
+Montani, Scateni and Scopigno 1994). A cell with a corner of unknown value stays open.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from tourgen.geometry import Float32, Float64, Int32, Mesh
+
+Keys = npt.NDArray[np.int64]
+
+AXIS_BITS = 21
+"""Bits of a grid coordinate in a key."""
+STEPS = (1 << 2 * AXIS_BITS, 1 << AXIS_BITS, 1)
+"""From a corner's key to the next one's along each axis."""
+CELL_CORNERS: Keys = np.array(
+    [(c & 1) * STEPS[0] + (c >> 1 & 1) * STEPS[1] + (c >> 2) for c in range(8)]
+)
+"""From a cell's lowest corner to each; bit 0 of a corner's number is x, 1 y, 2 z."""
+_EDGES = [(c, c | 1 << axis) for axis in range(3) for c in range(8) if not c >> axis & 1]
+_MOST_TRIANGLES = 5
+_LEAST_SHARE = 1e-3
+"""How near a vertex may come to a corner, in edges: nearer, its faces have no area."""
+
+
+def key_of(corner: npt.NDArray[np.integer]) -> Keys:
+    """(..., 3) grid coordinates, from 0 to 2 million, as one sortable number each."""
+    x, y, z = (corner[..., axis].astype(np.int64) for axis in range(3))
+    return (x << 2 * AXIS_BITS) | (y << AXIS_BITS) | z
+
+
+def corner_of(key: Keys) -> Int32:
+    """(n, 3) grid coordinates of (n,) keys."""
+    mask = (1 << AXIS_BITS) - 1
+    parts = (key >> 2 * AXIS_BITS, key >> AXIS_BITS & mask, key & mask)
+    return np.stack(parts, axis=-1).astype(np.int32)
+
+
+def most_cells() -> int:
+    """Along an axis, those beside the room included."""
+    return (1 << AXIS_BITS) - 64
+
+
+def marching_cubes(
+    key: Keys,
+    value: Float32,
+    low: Float32,
+    cell_m: float,
+    origin: Float64,
+    *,
+    steepest: float = np.inf,
+) -> Mesh:
+    """The surface where ``value`` is zero.
+
+    Args:
+        key: (n,) of the corners, sorted, each once; see ``key_of``.
+        value: (n,) of each corner, positive in the free space; NaN where it is unknown.
+        low: (3,) place of the corner (0, 0, 0), metres from ``origin``.
+        cell_m: Edge of a cell.
+        origin: Of the mesh.
+        steepest: Cells along whose edges the value changes its sign by more, over the way, stay
+            open: it jumps there.
+
+    Returns:
+        Faces counter-clockwise seen from where the value is positive; cells share vertices.
+        No faces where nothing crosses zero.
+    """
+    after = np.stack([_find(key, key + step) for step in STEPS], axis=1)
+    cells = _cells(after, value)
+    case = ((value[cells] > 0) << np.arange(8)).sum(axis=1)
+    crossed = (case > 0) & (case < 255)
+    cells, case = cells[crossed], case[crossed]
+    smooth = _smooth(value[cells], np.float32(steepest * cell_m))
+    cells, case = cells[smooth], case[smooth]
+    vertex_of, vertices = _vertices(key, value, after, low, cell_m)
+    faces = _faces(cells, case, vertex_of)
+    used, faces = _used(faces, len(vertices))
+    return Mesh(origin, vertices[used], faces)
+
+
+def _find(key: Keys, wanted: Keys) -> Int32:
+    """Position of each sorted key among the sorted ones, -1 where it is not there."""
+    at = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
+    return np.where(key[at] == wanted, at, -1).astype(np.int32)
+
+
+def _cells(after: Int32, value: Float32) -> Int32:
+    """(m, 8) the corners of the cells of which all are known."""
+    known = ~np.isnan(value)
+    cells = np.flatnonzero(known).astype(np.int32)[:, None]
+    for axis in range(3):
+        beyond = after[cells, axis]
+        whole = np.all((beyond >= 0) & known[beyond], axis=1)
+        cells = np.concatenate([cells[whole], beyond[whole]], axis=1)
+    return cells
+
+
+def _smooth(value: Float32, most: np.float32) -> npt.NDArray[np.bool_]:
+    """Mask of the cells along none of whose edges the value jumps across zero."""
+    smooth = np.ones(len(value), bool)
+    for a, b in _EDGES:
+        jumps = np.abs(value[:, a] - value[:, b]) > most
+        smooth &= ~(jumps & ((value[:, a] > 0) != (value[:, b] > 0)))
+    return smooth
+
+
+def _vertices(
+    key: Keys, value: Float32, after: Int32, low: Float32, cell_m: float
+) -> tuple[Int32, Float32]:
+    """(n, 3) number of the vertex on the edge from each corner along each axis, and (v, 3)."""
+    behind = value <= 0
+    cut = (after >= 0) & (behind[:, None] != behind[after])
+    cut &= ~(np.isnan(value)[:, None] | np.isnan(value)[after])
+    number = np.cumsum(cut, dtype=np.int32).reshape(cut.shape) - 1
+    corner, axis = np.nonzero(cut)
+    here, there = value[corner], value[after[corner, axis]]
+    share = np.clip(here / (here - there), _LEAST_SHARE, 1 - _LEAST_SHARE)
+    vertices = corner_of(key[corner]).astype(np.float32)
+    vertices[np.arange(len(corner)), axis] += share
+    return number, vertices * np.float32(cell_m) + low
+
+
+def _faces(cells: Int32, case: npt.NDArray[np.int64], vertex_of: Int32) -> Int32:
+    table, edge_corner, edge_axis = _table()
+    found = []
+    for triangle in range(_MOST_TRIANGLES):
+        more = table[case, triangle, 0] >= 0
+        cells, case = cells[more], case[more]
+        edge = table[case, triangle]
+        corner = np.take_along_axis(cells, edge_corner[edge], axis=1)
+        found.append(vertex_of[corner, edge_axis[edge]])
+    return np.concatenate(found)
+
+
+def _used(faces: Int32, count: int) -> tuple[npt.NDArray[np.bool_], Int32]:
+    used = np.zeros(count, bool)
+    used[faces] = True
+    return used, (np.cumsum(used, dtype=np.int32) - 1)[faces]
+
+
+@cache
+def _table() -> tuple[Int32, Int32, Int32]:
+    """(256, 5, 3) the edges that each triangle joins, by case, -1 for none; (12,) corner and axis.
+
+    Case bit i says that corner i lies in front. Edges are directed segments on the cube's faces,
+    the front to the right as seen from outside, joined to loops and cut into fans.
+    """
+    number = {edge: i for i, edge in enumerate(_EDGES)}
+    sides = [
+        {(axis, a >> axis & 1) for axis in range(3) if a >> axis & 1 == b >> axis & 1}
+        for a, b in _EDGES
+    ]
+    table = np.full((256, _MOST_TRIANGLES, 3), -1, np.int32)
+    for case in range(1, 255):
+        after: dict[int, int] = {}
+        for face in _cube_faces():
+            after |= _segments(face, case, number)
+        triangles = [triangle for loop in _loops(after) for triangle in _fan(loop, sides)]
+        table[case, : len(triangles)] = triangles
+    first, second = np.array(_EDGES, np.int32).T
+    return table, first, (second - first) // 2
+
+
+def _cube_faces() -> list[list[int]]:
+    """The corners of each face, counter-clockwise seen from outside."""
+    faces = []
+    for axis in range(3):
+        u, v = 1 << (axis + 1) % 3, 1 << (axis + 2) % 3
+        faces.append([corner | 1 << axis for corner in (0, u, u | v, v)])
+        faces.append([0, v, u | v, u])
+    return faces
+
+
+def _segments(face: list[int], case: int, number: dict[tuple[int, int], int]) -> dict[int, int]:
+    """Where the surface enters and leaves a face: around each run of corners in front."""
+    front = [bool(case >> corner & 1) for corner in face]
+    edge = [number[min(a, b), max(a, b)] for a, b in zip(face, face[1:] + face[:1], strict=True)]
+    found = {}
+    for start in range(4):
+        if front[start] and not front[start - 1]:
+            end = start
+            while front[(end + 1) % 4]:
+                end += 1
+            found[edge[end % 4]] = edge[start - 1]
+    return found
+
+
+def _loops(after: dict[int, int]) -> list[list[int]]:
+    loops = []
+    while after:
+        loop = [next(iter(after))]
+        while (following := after.pop(loop[-1])) != loop[0]:
+            loop.append(following)
+        loops.append(loop)
+    return loops
+
+
+def _fan(loop: list[int], sides: list[set[tuple[int, int]]]) -> list[tuple[int, int, int]]:
+    """Cut a loop into triangles without a diagonal on the cube's surface.
+
+    The neighbouring cell could draw the same diagonal, and four faces would share it.
+    """
+    for turn in range(len(loop)):
+        apex, *rest = loop[turn:] + loop[:turn]
+        if not any(sides[apex] & sides[edge] for edge in rest[1:-1]):
+            return [(apex, b, c) for b, c in pairwise(rest)]
+    raise AssertionError(loop)  # no loop of a cube is without such an apex

@@ -1,0 +1,226 @@
+"""Signed distance: how far in front of the nearest tangent plane a place lies (Hoppe et al. 1992).
+
+The planes come from ``tangent_planes``. Between them the distances to the nearest few are blended,
+with weights that end at the last of these, so that the blend has no steps (Shen, O'Brien and
+Shewchuk 2004; Kolluri 2005). The distance is unknown where the foot of a place on its nearest
+plane lies farther from that plane's point than the sampling density and the noise together: there
+the surface ends, and windows stay open.
+
+Distances are taken only at the corners of cells that the surface enters: from the cells with points
+on to their neighbours across every face that it crosses (Wyvill, McPheeters and Wyvill 1986;
+Bloomenthal 1988), so that time and memory follow the area.
+
+Tried on a sixth of the demo's first chamber with cells of 8 mm, against the truth: Hoppe's single
+plane steps at every change of the nearest point (normals 3.1° off, 12 % of the surface more than
+10 mm off); a second weighting by likeness of normals at each place, as Öztireli et al. do, lets
+false sheets grow (95th percentile 15 instead of 4.5 mm) and gains nothing where the planes were
+smoothed before. What keeps such sheets down: a distance cannot change by more than the way, so a
+larger jump is the middle between two walls, no wall (4.5 to 3.7 mm); the reach of a lone point
+ends at twice the room's spacing (3.0 mm); planes that their neighbours contradict go (2.8 mm).
+Poisson at 14 mm has 3.0 mm there, and its normals lie 6.8° off instead of 2.2°.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tourgen.errors import StageError
+from tourgen.geometry import Float32, Mesh, OrientedCloud
+from tourgen.stages.surface.marching_cubes import (
+    CELL_CORNERS,
+    STEPS,
+    Keys,
+    corner_of,
+    key_of,
+    marching_cubes,
+    most_cells,
+)
+from tourgen.stages.surface.samples import distinct_samples, require_range
+from tourgen.stages.surface.tangent_planes import Smoothing, TangentPlanes, tangent_planes
+
+VERSION = 1
+_CHUNK = 1 << 17
+_STEEPEST = 1.2
+"""Most change of the distance over the way; a little more than 1 for the blend."""
+_DENSEST, _SPARSEST = 0.5, 2.0
+"""The part of the room's spacing that a region's own counts for, at least and at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The grid and the surface.
+
+    Attributes:
+        cell_m: Edge of the grid's cells, 0.5 mm to 1 m; two thirds of the spacing is enough.
+        spacing_m: Distance between neighbouring points in the middle of the room, 0.1 mm to 1 m.
+        noise_m: Standard deviation of the range, 0 to 0.1 m.
+        neighbours: Points that speak for a tangent plane, 4 to 64.
+        crease_deg: Angle at which a crease begins, 5° to 90°; less keeps it sharper and the
+            walls rougher.
+        blend: Planes that speak for a place, 1 (as Hoppe had it) to 32.
+        reach: How far the surface goes on past a point, in spacings, 0.5 to 5; the noise is added.
+        support: Share of a plane's neighbours that must lie on it, 0 to 0.9.
+
+    Raises:
+        InputError: One lies outside its range.
+    """
+
+    cell_m: float
+    spacing_m: float
+    noise_m: float = 0.002
+    neighbours: int = 16
+    crease_deg: float = 25.0
+    blend: int = 8
+    reach: float = 1.5
+    support: float = 0.3
+
+    def __post_init__(self) -> None:
+        require_range("cell_m", self.cell_m, 0.0005, 1)
+        require_range("spacing_m", self.spacing_m, 0.0001, 1)
+        require_range("noise_m", self.noise_m, 0, 0.1)
+        require_range("neighbours", self.neighbours, 4, 64)
+        require_range("crease_deg", self.crease_deg, 5, 90)
+        require_range("blend", self.blend, 1, 32)
+        require_range("reach", self.reach, 0.5, 5)
+        require_range("support", self.support, 0, 0.9)
+
+
+def signed_distance(oriented: OrientedCloud, settings: Settings) -> Mesh:
+    """Find where the distance is zero.
+
+    Args:
+        oriented: n points with normals toward the free space.
+        settings: See ``Settings``.
+
+    Returns:
+        A mesh that is open where points are missing, faces counter-clockwise seen from the free
+        space.
+
+    Raises:
+        InputError: The room has more than two million cells from end to end.
+        StageError: There is no surface.
+    """
+    oriented = distinct_samples(oriented)
+    extent_m = float(np.ptp(oriented.cloud.points, axis=0).max())
+    require_range("cell_m", settings.cell_m, extent_m / most_cells(), 1)
+    noise_m = max(settings.noise_m, settings.spacing_m / 100)
+    smoothing = Smoothing(settings.neighbours, settings.crease_deg, noise_m)
+    planes = tangent_planes(oriented, smoothing)
+    planes = planes.take(planes.support >= settings.support)
+    if not len(planes.points):
+        raise StageError(
+            "surface: expected points that agree on a surface, found none",
+            "check the normals, or thin the scan less",
+        )
+    field = _Field(planes, settings)
+    key, value = _grown(field, planes.points)
+    mesh = marching_cubes(
+        key, value, field.low, settings.cell_m, oriented.cloud.origin, steepest=_STEEPEST
+    )
+    if not len(mesh.faces):
+        raise StageError(
+            "surface: expected a surface, found none", "check the normals, or take larger cells"
+        )
+    return mesh
+
+
+class _Field:
+    """The distance at the corners of a grid.
+
+    Attributes:
+        low: (3,) float32, place of the corner (0, 0, 0), metres.
+        cell_m: Edge of a cell.
+    """
+
+    def __init__(self, planes: TangentPlanes, settings: Settings) -> None:
+        spacing_m = np.clip(
+            planes.spacing_m, _DENSEST * settings.spacing_m, _SPARSEST * settings.spacing_m
+        )
+        self._planes = planes
+        self._reach_m = np.float32(settings.reach) * spacing_m + np.float32(settings.noise_m)
+        self._same = np.float32(1 - np.cos(np.radians(settings.crease_deg)))
+        self._count = min(settings.blend + 1, len(planes.points))
+        self._tree = cKDTree(planes.points)
+        self.cell_m = np.float32(settings.cell_m)
+        self.low = planes.points.min(axis=0) - self._reach_m.max() - 2 * self.cell_m
+
+    def __call__(self, key: Keys) -> Float32:
+        """(n,) distances at (n,) corners, NaN where unknown."""
+        parts = [self._distance(key[at : at + _CHUNK]) for at in range(0, len(key), _CHUNK)]
+        return np.concatenate([np.empty(0, np.float32), *parts])
+
+    def _distance(self, key: Keys) -> Float32:
+        place = corner_of(key).astype(np.float32) * self.cell_m + self.low
+        rank = np.arange(1, self._count + 1)
+        distance, index = self._tree.query(place, k=rank, workers=-1)
+        away, near = np.asarray(distance, np.float32), np.asarray(index)
+        offset, normals = place[:, None] - self._planes.points[near], self._planes.normals[near]
+        height = np.einsum("ikj,ikj->ik", offset, normals)
+        reach_m = self._reach_m[near[:, 0]]
+        foot_m2 = np.square(away[:, 0]) - np.square(height[:, 0])
+        known = (foot_m2 < np.square(reach_m)) & (np.abs(height[:, 0]) < reach_m)
+        weight = np.square(1 - np.square(away / np.maximum(away[:, -1:], 1e-9)))
+        weight[:, 0] += np.float32(1e-6)  # all may be equally far
+        weight /= weight.sum(axis=1, keepdims=True)
+        blended = (weight * self._rounded(height, offset, normals, weight)).sum(axis=1)
+        return np.where(known, blended, np.float32(np.nan))
+
+    def _rounded(
+        self, height: Float32, offset: Float32, normals: Float32, weight: Float32
+    ) -> Float32:
+        """Heights along the middle between each plane's normal and their mean.
+
+        Planes that touch a sphere lie outside it; so taken, their heights over it are its own.
+        Across a crease a plane is a plane.
+        """
+        mean = np.einsum("ik,ikj->ij", weight, normals)
+        mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-6)
+        alike = np.einsum("ij,ikj->ik", mean, normals)
+        along_mean = np.einsum("ij,ikj->ik", mean, offset)
+        share = np.exp((alike - 1) / self._same) / 2
+        return np.asarray(height + share * (along_mean - height), np.float32)
+
+
+def _grown(field: _Field, seeds: Float32) -> tuple[Keys, Float32]:
+    """Corners and distances of all cells that the surface enters, from those with seeds on."""
+    fresh = _distinct(key_of(((seeds - field.low) / field.cell_m).astype(np.int32)))
+    cells, key = np.empty(0, np.int64), np.empty(0, np.int64)
+    value = np.empty(0, np.float32)
+    while len(fresh):
+        cells = np.insert(cells, np.searchsorted(cells, fresh), fresh)
+        new = _without(_distinct(fresh[:, None] + CELL_CORNERS), key)
+        at = np.searchsorted(key, new)
+        key, value = np.insert(key, at, new), np.insert(value, at, field(new))
+        of_cells = value[np.searchsorted(key, fresh[:, None] + CELL_CORNERS)]
+        beyond = _beyond_crossed_faces(fresh, of_cells, field.cell_m)
+        fresh = _without(_distinct(beyond), cells)
+    return key, value
+
+
+def _beyond_crossed_faces(cells: Keys, value: Float32, cell_m: np.float32) -> Keys:
+    """The cells across those faces of ``cells`` that the surface crosses."""
+    found = []
+    for axis, step in enumerate(STEPS):
+        for side, way in ((0, -step), (1, step)):
+            face = value[:, [corner for corner in range(8) if corner >> axis & 1 == side]]
+            low, high = face.min(axis=1), face.max(axis=1)  # NaN where one is unknown
+            crossed = (low <= 0) & (high > 0) & (high - low < np.sqrt(2) * _STEEPEST * cell_m)
+            found.append(cells[crossed] + way)
+    return np.concatenate(found)
+
+
+def _distinct(keys: Keys) -> Keys:
+    ordered = np.sort(keys, axis=None)
+    first = np.concatenate([[True], ordered[1:] != ordered[:-1]])[: len(ordered)]
+    return np.asarray(ordered[first], np.int64)
+
+
+def _without(keys: Keys, known: Keys) -> Keys:
+    """The keys that are not among the known ones, all sorted."""
+    if not len(known):
+        return keys
+    at = np.minimum(np.searchsorted(known, keys), len(known) - 1)
+    return np.asarray(keys[known[at] != keys], np.int64)
