@@ -1,0 +1,201 @@
+"""How true cleaning is: ``python tests/peers/cleaning.py TOUR [--gallery FOLDER] [--room ID]``.
+
+The scans of the modelled rooms are cleaned as a build does it, without any `keep` or `remove`
+box, once from the E57 (the station of each point is known) and once from the merged PLY (it is
+not), and the points left are held against the labels that ``tourgen.simulate`` wrote. ``gallery``
+is a structured E57 by another simulator, with the true mesh but without labels; they follow from
+the mesh: what lies over 0.1 m off is a stray, what lies over 10 mm and five times the range noise
+off is mixed.
+
+share gone         Of each label. Mixed pixels count where they lie over 10 mm off the true surface.
+lost, of its area  Of the true area that a station sees and that had a point within 10 mm: what
+                   has none after cleaning.
+bare before/after  Of the true area that a station sees: what has no point within 10 mm.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import open3d as o3d
+from scipy.spatial import cKDTree
+from score import Truth, load, spread
+
+from tourgen.geometry import Float64, PointCloud
+from tourgen.scans import open_scan, read_room
+from tourgen.simulate import VERSION
+from tourgen.simulation.light import ray_scene
+from tourgen.stages import clean, sift, stations
+
+SURFACE, MIXED, STRAY, GHOST, PASSER_BY = range(5)
+NEAR_M = 0.010
+GOALS = {
+    "e57": {"stray": 0.99, "ghost": 0.99, "passer-by": 0.99, "mixed": 0.80},
+    "ply": {"stray": 0.99, "ghost": 0.90, "mixed": 0.60},
+}
+LOST = 0.005
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One scan with its truth.
+
+    Attributes:
+        name: Room and format.
+        cloud: As read.
+        stations: (s, 3) metres from the cloud's origin; empty where the scan does not tell.
+        label: (n,) what each point is.
+        off_m: (n,) how far it lies from the true surface.
+        wanted: (m, 3) places on the true surface that a station sees.
+    """
+
+    name: str
+    cloud: PointCloud
+    stations: Float64
+    label: npt.NDArray[np.uint8]
+    off_m: npt.NDArray[np.float32]
+    wanted: Float64
+
+
+def modelled(tour: Path, room: str, suffix: str) -> Case:
+    """A room of the demo."""
+    cloud, known, _ = read_room([open_scan(tour / "scans" / f"{room}.{suffix}")])
+    label = np.load(tour / "truth" / f"{room}.npz")["label"]
+    if suffix == "e57":  # each station's points in the order of its grid, which the PLY shuffles
+        order = np.random.default_rng([VERSION, *room.encode(), 2]).permutation(len(label))
+        label = label[np.argsort(order)]
+    truth = Truth(tour / "truth", room)
+    points, face = spread(truth.vertices, truth.faces, np.random.default_rng(1))
+    wanted = points[truth.seen(points, face)]
+    off_m = _off_m(truth.scene, cloud)
+    return Case(f"{room}.{suffix}", cloud, known, label, off_m, wanted - cloud.origin)
+
+
+def gallery(folder: Path) -> Case:
+    """The structured scan of a room with windows."""
+    cloud, known, _ = read_room([open_scan(folder / "scan_structured.e57")])
+    vertices, faces = load(folder / "gt_mesh.ply")
+    scene = ray_scene(vertices, faces)
+    off_m = _off_m(scene, cloud)
+    range_m = np.linalg.norm(cloud.points - known[cloud.station], axis=1)
+    noise_m = 0.0015 + 0.0002 * range_m
+    label = np.where(off_m > np.maximum(NEAR_M, 5 * noise_m), MIXED, SURFACE)
+    label[off_m > 0.1] = MIXED
+    low, high = vertices.min(axis=0) - 0.1, vertices.max(axis=0) + 0.1
+    label[((cloud.points < low) | (cloud.points > high)).any(axis=1)] = STRAY
+    points, _ = spread(vertices, faces, np.random.default_rng(1))
+    wanted = points[_seen_from(scene, points, known + cloud.origin)]
+    return Case("gallery.e57", cloud, known, label.astype(np.uint8), off_m, wanted - cloud.origin)
+
+
+def _off_m(scene: Any, cloud: PointCloud) -> npt.NDArray[np.float32]:
+    places = o3d.core.Tensor((cloud.points + cloud.origin).astype(np.float32))
+    return np.asarray(scene.compute_distance(places).numpy())
+
+
+def _seen_from(scene: Any, points: Float64, known: Float64) -> npt.NDArray[np.bool_]:
+    seen = np.zeros(len(points), np.bool_)
+    for station in known:
+        way = points - station
+        rays = np.concatenate([np.broadcast_to(station, way.shape), way], axis=1)
+        reach = scene.cast_rays(o3d.core.Tensor(rays.astype(np.float32)))["t_hit"].numpy()
+        seen |= (reach > 0.999) & (
+            way[:, 2] > -np.sin(np.radians(60)) * np.linalg.norm(way, axis=1)
+        )
+    return seen
+
+
+def cleaned(case: Case) -> tuple[PointCloud, Float64]:
+    """What a build keeps, and the stations it goes by."""
+    known = case.stations
+    if not len(known):
+        rough = clean.clean(case.cloud, clean.Settings())
+        known = stations.find_stations(rough.points, stations.Settings())
+    return sift.sift(case.cloud, known, sift.Settings()).cloud, known
+
+
+def figures(case: Case, kept: PointCloud) -> dict[str, float]:
+    """How true the points left are."""
+    gone = ~np.isin(_rows(case.cloud.points), _rows(kept.points))
+    wrong = {
+        "stray": case.label == STRAY,
+        "ghost": case.label == GHOST,
+        "passer-by": case.label == PASSER_BY,
+        "mixed": (case.label == MIXED) & (case.off_m > NEAR_M),
+        "mixed, all": case.label == MIXED,
+        "surface": case.label == SURFACE,
+    }
+    shares = {name: float(gone[at].mean()) for name, at in wrong.items() if at.any()}
+    before = _gap_m(case.cloud.points, case.wanted) <= NEAR_M
+    after = _gap_m(kept.points, case.wanted) <= NEAR_M
+    return {
+        **shares,
+        "lost": float((before & ~after).sum() / before.sum()),
+        "bare before": float((~before).mean()),
+        "bare after": float((~after).mean()),
+    }
+
+
+def _rows(points: npt.NDArray[np.float32]) -> npt.NDArray[np.void]:
+    return np.ascontiguousarray(points).view(np.dtype((np.void, 12))).reshape(-1)
+
+
+def _gap_m(points: npt.NDArray[np.float32], wanted: Float64) -> Float64:
+    distance, _ = cKDTree(points).query(wanted, distance_upper_bound=2 * NEAR_M, workers=-1)
+    return np.asarray(distance)
+
+
+def reached(kind: str, found: dict[str, float]) -> bool:
+    """Whether a case's goals hold."""
+    goals = GOALS[kind]
+    return found["lost"] <= LOST and all(
+        found[name] >= goal for name, goal in goals.items() if name in found
+    )
+
+
+def cases(given: argparse.Namespace) -> Any:
+    """The scans asked for, one after the other."""
+    rooms = given.room or sorted(file.stem for file in (given.tour / "truth").glob("*.json"))
+    for room in rooms:
+        if room != "gallery":
+            for suffix in given.format or ("e57", "ply"):
+                yield suffix, modelled(given.tour, room, suffix)
+    if given.gallery and (not given.room or "gallery" in given.room):
+        yield "e57", gallery(given.gallery)
+
+
+def main() -> int:
+    """The command; 1 where a goal is missed."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("tour", type=Path, help="a tour's folder, with scans/ and truth/")
+    parser.add_argument("--gallery", type=Path, help="folder of the structured scan and its mesh")
+    parser.add_argument("--room", action="append", help="only this room")
+    parser.add_argument("--format", action="append", choices=["e57", "ply"], help="only this")
+    given = parser.parse_args()
+    missed = 0
+    for kind, case in cases(given):
+        begun = time.perf_counter()
+        kept, known = cleaned(case)
+        seconds = time.perf_counter() - begun
+        found = figures(case, kept)
+        hit = reached(kind, found)
+        missed += not hit
+        told = {name: round(value, 5) for name, value in found.items()}
+        print(
+            f"{case.name}: {'reached' if hit else 'MISSED'}, {len(case.cloud):,} points, "
+            f"{len(known)} stations, {seconds:.0f} s, {json.dumps(told)}",
+            flush=True,
+        )
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
