@@ -14,6 +14,7 @@ help:
 	@echo "make test        every test but the benches"
 	@echo "make lint        ruff, mypy and the viewer's types"
 	@echo "make bench       accuracy of the demo against its ground truth"
+	@echo "make bench-fidelity   every method and its peers against it (BENCH='--room chamber1')"
 	@echo "make pictures    screenshots of the demo for README and docs"
 	@echo "make lock        pin the newest versions, with their hashes"
 	@echo "make clean       drop all that make made"
@@ -26,6 +27,11 @@ install: system $(VENV)/.tourgen viewer
 .PHONY: system
 system: NEEDED_BY :=
 system:
+	$(install_debian)
+
+.PHONY: system-bench
+system-bench: NEEDED_BY := --tests --bench
+system-bench:
 	$(install_debian)
 
 .PHONY: system-tests
@@ -53,6 +59,11 @@ $(VENV)/.packages: requirements/build.txt requirements/test.txt | $(BIN)/python
 
 $(VENV)/.tourgen: $(VENV)/.packages pyproject.toml hatch_build.py
 	$(BIN)/python -m pip $(PIP) install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(VENV)/.bench: requirements/bench.txt | $(VENV)/.packages
+	$(PYTHON) -m pip $(PIP) --python $(BIN)/python install --quiet --only-binary :all: \
+		--require-hashes -r requirements/bench.txt
 	@touch $@
 
 # Compiles only where static/ has changed since.
@@ -94,6 +105,12 @@ lint: install
 bench: demo
 	$(BIN)/python tests/peers/score.py $(DEMO) --table docs/benchmarks.md
 
+# Hours on 2 cores the first time; what was made or measured before is kept in build/fidelity.
+.PHONY: bench-fidelity
+bench-fidelity: demo system-bench $(VENV)/.bench
+	$(BIN)/python tests/peers/fidelity.py $(DEMO) --gallery ../shared/scans/gallery_sim \
+		$(or $(BENCH),--write docs/benchmarks.md)
+
 # ---- What is kept up
 
 # Without the configuration of this machine, so that no address or path of it is written.
@@ -107,7 +124,8 @@ lock: $(VENV)/.packages
 	$(COMPILE) requirements/build.in -o requirements/build.txt && \
 	$(COMPILE) pyproject.toml -c requirements/build.txt -o requirements/run.txt && \
 	$(COMPILE) pyproject.toml --extra test -c requirements/build.txt -c requirements/run.txt \
-		-o requirements/test.txt
+		-o requirements/test.txt && \
+	$(COMPILE) pyproject.toml --extra bench -c requirements/test.txt -o requirements/bench.txt
 	rm -rf $(VENV)/lock
 	for folder in static tests; do \
 		(cd $$folder && rm -f package-lock.json && $(NPM) install --package-lock-only --ignore-scripts); \

@@ -1,7 +1,7 @@
 """What this machine lacks, each with the line that mends it.
 
 Runs before anything is installed: it imports the standard library alone, and the Makefile asks
-``python3 -m tourgen.doctor [--tests]`` which Debian packages to fetch.
+``python3 -m tourgen.doctor [--tests] [--bench]`` which Debian packages to fetch.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import ctypes
 import os
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,12 @@ LIBRARIES = {
     "libgomp.so.1": "libgomp1",
 }
 """What ``import open3d`` loads on Linux, and the Debian package of each."""
+
+BENCH_LIBRARIES = {
+    "libOpenGL.so.0": "libopengl0",
+    "libfontconfig.so.1": "libfontconfig1",
+}
+"""What ``import pymeshlab`` loads besides, for the benches."""
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 """Programs that can draw a tour for the tests, the best known first."""
@@ -51,17 +57,20 @@ class Finding:
     package: str = ""
 
 
-def findings(folder: Path, *, tests: bool = False) -> list[Finding]:
+def findings(folder: Path, *, tests: bool = False, bench: bool = False) -> list[Finding]:
     """Look this machine over.
 
     Args:
         folder: Where the tours are to be built; it must exist.
         tests: Ask also for what the browser tests need.
+        bench: Ask also for what the peers of the benches need.
 
     Returns:
         One finding for each thing lacking; none where all is well.
     """
-    found = [*_libraries(), *_disk(folder), *_memory()]
+    found = [*_libraries(LIBRARIES, "Open3D"), *_disk(folder), *_memory()]
+    if bench:
+        found += _libraries(BENCH_LIBRARIES, "PyMeshLab")
     if tests and browser() is None:
         found.append(
             Finding(
@@ -80,15 +89,15 @@ def browser() -> Path | None:
     return Path(found) if found else None
 
 
-def _libraries() -> Iterator[Finding]:
+def _libraries(wanted: Mapping[str, str], by: str) -> Iterator[Finding]:
     if sys.platform != "linux":
-        return  # Elsewhere the wheel of Open3D brings its own.
-    for library, package in LIBRARIES.items():
+        return  # Elsewhere the wheels bring their own.
+    for library, package in wanted.items():
         try:
             ctypes.CDLL(library)
         except OSError as error:
             mend = _install_line(package, of=library)
-            yield Finding(library, f"needed by Open3D, {error}", mend, package)
+            yield Finding(library, f"needed by {by}, {error}", mend, package)
 
 
 def _install_line(package: str, *, of: str) -> str:
@@ -118,5 +127,5 @@ def _gib(size: int) -> str:
 
 
 if __name__ == "__main__":
-    lacking = findings(Path.cwd(), tests="--tests" in sys.argv)
+    lacking = findings(Path.cwd(), tests="--tests" in sys.argv, bench="--bench" in sys.argv)
     print(*(finding.package for finding in lacking if finding.package))

@@ -38,6 +38,20 @@ def test_a_missing_browser_matters_to_tests_alone(
     assert finding.package == "chromium"
 
 
+def test_a_library_of_the_peers_matters_to_benches_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def load(name: str) -> None:
+        if name == "libOpenGL.so.0":
+            raise OSError(f"{name}: cannot open shared object file")
+
+    monkeypatch.setattr(ctypes, "CDLL", load)
+    monkeypatch.setattr(doctor.sys, "platform", "linux")
+    assert doctor.findings(tmp_path) == []
+    (finding,) = doctor.findings(tmp_path, bench=True)
+    assert finding.package == "libopengl0"
+
+
 def test_a_full_disk_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "DISK_NEEDED", 1 << 60)
     (finding,) = doctor.findings(tmp_path)

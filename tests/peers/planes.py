@@ -218,7 +218,7 @@ class Creases:
         lean = np.einsum(
             "efx,ex->ef", normals[edge], self.sides[nearest, 0] - self.sides[nearest, 1]
         )
-        turns = np.flatnonzero(lean[:, 0] * lean[:, 1] < 0)
+        turns = np.flatnonzero((lean[:, 0] >= 0) != (lean[:, 1] >= 0))
         edge, nearest, at = edge[turns], nearest[turns], at[turns]
         offset = at - self.points[nearest]
         offset -= (offset * self.along[nearest]).sum(axis=1, keepdims=True) * self.along[nearest]

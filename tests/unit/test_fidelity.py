@@ -1,0 +1,195 @@
+"""The bench tells good from bad: surfaces, planes, creases, pictures, squares, sections."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import picture_score
+import planes
+import plaque
+import pytest
+import score
+import sections
+import surface_score
+import variants
+from drawing import Camera, draw, vertex_colored
+from true_picture import Shot
+
+from tourgen.simulation.light import ray_scene
+
+CORNERS = np.array(
+    [[x, y, z] for z in (0.0, 2.5) for y in (-2.0, 2.0) for x in (-2.0, 2.0)], np.float64
+)
+FACES = np.array(
+    [
+        *([0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7]),
+        *([0, 5, 1], [0, 4, 5], [2, 3, 7], [2, 7, 6]),
+        *([0, 2, 6], [0, 6, 4], [1, 7, 3], [1, 5, 7]),
+    ],
+    np.int32,
+)
+"""A box that looks inwards."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def fewer_samples() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(score, "SAMPLES", 30_000)
+        yield
+
+
+@pytest.fixture(scope="module")
+def truth(tmp_path_factory: pytest.TempPathFactory) -> score.Truth:
+    import open3d as o3d
+
+    folder = tmp_path_factory.mktemp("truth")
+    mesh = o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(CORNERS), o3d.utility.Vector3iVector(FACES)
+    )
+    o3d.io.write_triangle_mesh(str(folder / "box.ply"), mesh)
+    stations = [{"position": [x, 0, 1.5]} for x in (-1.5, 1.5)]
+    facts = {"stations": stations, "mirror_faces": []}
+    (folder / "box.json").write_text(json.dumps(facts), encoding="utf-8")
+    return score.Truth(folder, "box")
+
+
+def chamfered(by_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """The box with its twelve edges cut off at 45 degrees."""
+    from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+    middle, half = np.array([0, 0, 1.25]), np.array([2.0, 2.0, 1.25])
+    cuts = [np.array(n) for n in np.ndindex(3, 3, 3)]
+    normals = np.array([n - 1 for n in cuts if 0 < np.abs(n - 1).sum() < 3], float)
+    reach = np.abs(normals) @ half - by_m * (np.abs(normals).sum(axis=1) == 2)
+    corners = HalfspaceIntersection(np.column_stack([normals, -reach]), np.zeros(3)).intersections
+    hull = ConvexHull(corners)
+    faces = hull.simplices.copy()
+    a, b, c = (corners[faces[:, k]] for k in range(3))
+    outward = (np.cross(b - a, c - a) * a).sum(axis=1) > 0
+    faces[outward] = faces[outward][:, ::-1]
+    return corners + middle, faces.astype(np.int32)
+
+
+def test_the_truth_itself_scores_full(truth: score.Truth) -> None:
+    reference = surface_score.Reference.of(truth)
+    samples = surface_score.Samples.of(truth.vertices, truth.faces, truth)
+    figures = surface_score.surface_figures(truth.vertices, truth.faces, samples, reference)
+    assert figures["f_score_2mm"] == 1
+    assert figures["normal_agreement"] == pytest.approx(1)
+
+
+def test_a_shift_costs_the_score_below_it_alone(truth: score.Truth) -> None:
+    grown = truth.vertices + 0.004 * np.sign(truth.vertices - [0, 0, 1.25])
+    reference = surface_score.Reference.of(truth)
+    samples = surface_score.Samples.of(grown, truth.faces, truth)
+    figures = surface_score.surface_figures(grown, truth.faces, samples, reference)
+    assert figures["f_score_2mm"] < 0.02
+    assert figures["f_score_5mm"] > 0.98
+
+
+def test_flat_walls_and_floor_are_measured(truth: score.Truth) -> None:
+    flat = planes.Flatness(truth)
+    samples = surface_score.Samples.of(truth.vertices, truth.faces, truth)
+    assert flat.figures(samples)["walls_rms_mm"] == pytest.approx(0, abs=0.01)
+    lifted = truth.vertices + np.array([0, 0, 0.003])
+    figures = flat.figures(surface_score.Samples.of(lifted, truth.faces, truth))
+    assert figures["floor_rms_mm"] == pytest.approx(3, abs=0.05)
+    assert figures["walls_rms_mm"] == pytest.approx(0, abs=0.01)
+    tilted = truth.vertices + truth.vertices[:, :1] * [0, 0, np.tan(np.radians(0.2))]
+    figures = flat.figures(surface_score.Samples.of(tilted, truth.faces, truth))
+    assert figures["floor_normals_deg"] == pytest.approx(0.2, abs=0.02)
+
+
+def test_creases_are_found_where_they_are(truth: score.Truth) -> None:
+    creases = planes.Creases(truth)
+    figures = creases.figures(truth.vertices, truth.faces)
+    assert figures["creases_m"] == pytest.approx(8 * 4 + 4 * 2.5, abs=0.2)
+    assert figures["crease_p90_mm"] < 0.1
+    assert figures["crease_within_4mm"] == 1
+
+
+def test_cut_off_edges_are_no_creases(truth: score.Truth) -> None:
+    creases = planes.Creases(truth)
+    near = creases.figures(*chamfered(0.003))
+    far = creases.figures(*chamfered(0.020))
+    assert near["crease_within_4mm"] > 0.9
+    assert far["crease_within_4mm"] < 0.1
+
+
+def shot(picture: np.ndarray) -> Shot:
+    judged = np.ones(picture.shape[:2], np.bool_)
+    judged[:, :8] = False
+    return Shot(picture, judged, np.ones(picture.shape[:2]))
+
+
+def test_a_gain_is_forgiven_and_noise_is_not() -> None:
+    rng = np.random.default_rng(0)
+    true = np.repeat(np.repeat(rng.integers(60, 180, (6, 8, 3)), 8, 0), 8, 1).astype(np.uint8)
+    masked = true.copy()
+    masked[:, :8] = 255
+    darker = np.rint(masked * np.array([0.9, 0.95, 0.85])).astype(np.uint8)
+    forgiven = picture_score.score_pictures([darker], [shot(true)])
+    assert forgiven.psnr_db[0] > 50
+    assert forgiven.ssim[0] > 0.99
+    noisy = np.clip(true + rng.normal(0, 10, true.shape), 0, 255).astype(np.uint8)
+    punished = picture_score.score_pictures([noisy], [shot(true)])
+    assert punished.psnr_db[0] == pytest.approx(20 * np.log10(255 / 10), abs=0.3)
+
+
+def test_squares_are_read_in_a_true_view_and_not_in_a_blurred_one() -> None:
+    from scipy.ndimage import gaussian_filter
+
+    camera, boards = plaque.plaque_view("chamber1")
+    picture = np.full((540, 960, 3), 128, np.uint8)
+    for board in boards[:2]:
+        rows, columns = plaque.projected(camera, board.middles)
+        half = (rows[0, 0] - rows[1, 0]) / 2
+        for row, column, white in zip(rows.flat, columns.flat, board.white.flat, strict=True):
+            top, left = (int(np.rint(at - half)) for at in (row, column))
+            bottom, right = (int(np.rint(at + half)) for at in (row, column))
+            picture[top : bottom + 1, left : right + 1] = 230 if white else 30
+    sharp = plaque.read_board(picture, picture, camera, boards[1])
+    assert (sharp.right, sharp.contrast) == (1, 1)
+    blurred = gaussian_filter(picture, (5, 5, 0))
+    assert plaque.read_board(blurred, picture, camera, boards[1]).contrast < 0.2
+
+
+def test_colours_are_drawn_where_they_are() -> None:
+    colors = np.full((8, 3), 200, np.uint8)
+    camera = Camera(np.array([0.0, 0.0, 1.2]), np.array([1.0, 0.0, 1.2]))
+    drawn = draw(ray_scene(CORNERS, FACES), vertex_colored(colors, FACES), camera, (32, 18))
+    assert (drawn == 200).all()
+    wall = draw(
+        ray_scene(CORNERS, FACES[-2:]), vertex_colored(colors, FACES[-2:]), camera, (32, 18)
+    )
+    assert (wall[9, 16] == 200).all()
+    outside = Camera(camera.position, np.array([-1.0, 0.0, 1.2]))
+    void = draw(
+        ray_scene(CORNERS, FACES[-2:]), vertex_colored(colors, FACES[-2:]), outside, (32, 18)
+    )
+    assert (void != 200).any(axis=2).all()
+
+
+def test_a_section_is_rewritten_alone(tmp_path: Path) -> None:
+    file = tmp_path / "benchmarks.md"
+    sections.rewrite(file, "One", "first")
+    sections.rewrite(file, "Two", "second\n\n### Part\n\nmore")
+    sections.rewrite(file, "One", "third")
+    told = file.read_text(encoding="utf-8")
+    assert told == "# Benchmarks\n\n## One\n\nthird\n\n## Two\n\nsecond\n\n### Part\n\nmore\n"
+
+
+def test_a_variant_differs_by_its_method_alone() -> None:
+    told = (Path(__file__).parents[2] / "sites/lighthouse/tour.toml").read_text(encoding="utf-8")
+    whole = {room["id"]: room for room in tomllib.loads(told)["room"]}
+    variant = tomllib.loads(variants.with_method(variants.alone(told, "chamber2"), "auto"))
+    (room,) = variant["room"]
+    assert room.pop("surface")["method"] == "auto"
+    expected = {key: value for key, value in whole["chamber2"].items() if key != "link"}
+    expected.pop("surface", None)
+    assert room == expected
+    assert variant["tour"]["start"] == "chamber2"
