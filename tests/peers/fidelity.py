@@ -12,11 +12,13 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
+import cleaning
 import contestants
 import numpy as np
+import oracle
 import report
 from browsing import photographed, published
 from contestants import CHAINS, PUBLISHED, Contestant
@@ -25,12 +27,13 @@ from ledger import Ledger, digest
 from picture_score import fitted_gain, score_pictures
 from planes import Creases, Flatness, Rails, model_rods
 from plaque import EDGES_MM, plaque_view, read_board
-from rooms import BenchRoom, demo_rooms, gallery
+from rooms import GALLERY, BenchRoom, demo_rooms, gallery
 from seams import seam_figures
 from surface_score import Figures, Reference, Samples, best, surface_figures
 from true_picture import TexturedTruth, true_shots
 from variants import built, gallery_tour
 
+import tourgen
 from tourgen.geometry import UInt8
 from tourgen.simulation.light import ray_scene
 
@@ -146,6 +149,24 @@ class Bench:
         return self.ledger.figures(f"picture-{digest(one.files)}{weight}", measure)
 
 
+def cleaned(room: str, given: argparse.Namespace, ledger: Ledger) -> dict[str, Figures]:
+    """What cleaning leaves of a room's faults, by the format of the scan."""
+    stages = sorted((Path(tourgen.__file__).parent / "stages").rglob("*.py"))
+
+    def measure(kind: str) -> Figures:
+        if room == GALLERY:
+            case = cleaning.gallery(given.gallery)
+        else:
+            case = cleaning.modelled(given.tour, room, kind)
+        return cleaning.figures(case, cleaning.cleaned(case)[0])
+
+    kinds = ("e57",) if room == GALLERY else ("e57", "ply")
+    code = digest([Path(cleaning.__file__), *stages])
+    return {
+        kind: ledger.figures(f"cleaning-{kind}-{code}", partial(measure, kind)) for kind in kinds
+    }
+
+
 def main() -> int:
     """The command; 1 where a room is not won."""
     given = _asked()
@@ -202,6 +223,11 @@ def _judged(room: BenchRoom, given: argparse.Namespace) -> report.RoomResult:
         columns[program] = best([row for row in rows if row[0].name == program])
     pictures: dict[str, list[UInt8]] = {}
     if is_demo and not given.skip_picture:
+        site = oracle.built_oracle(tour, room, bench.textured, given.scratch)
+        if isinstance(site, str):
+            refused[oracle.NAME] = site
+        else:
+            columns[oracle.NAME] = contestants.ours(oracle.NAME, site, room.id), {}
         budget = contestants.tiles_bytes(given.tour / "site", room.id)
         for name, (one, figures) in columns.items():
             print(f"{room.id}: pictures of {name} ...", flush=True)
@@ -215,6 +241,7 @@ def _judged(room: BenchRoom, given: argparse.Namespace) -> report.RoomResult:
         {name: one.setting for name, (one, _) in columns.items() if one.setting},
         [(one.name, one.setting, figures) for one, figures in rows],
         refused,
+        cleaned(room.id, given, bench.ledger),
         pictures,
     )
 

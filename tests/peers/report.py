@@ -53,6 +53,7 @@ class RoomResult:
         settings: The setting of each peer's column.
         attempts: Program, setting and figures of every attempt.
         refused: Methods that would not, with their reasons.
+        cleaning: What cleaning did to the scan, by its format.
         pictures: By contestant, and of "truth"; empty where none were taken.
     """
 
@@ -61,6 +62,7 @@ class RoomResult:
     settings: Mapping[str, str]
     attempts: Sequence[tuple[str, str, Figures]]
     refused: Mapping[str, str]
+    cleaning: Mapping[str, Figures]
     pictures: Mapping[str, Sequence[UInt8]]
 
     @property
@@ -114,8 +116,32 @@ def write(results: Sequence[RoomResult], file: Path) -> None:
             name = f"fidelity-{result.room}-{number}.webp"
             names = _side_by_side(result, number, file.parent / "pictures" / name)
             parts.append(f"{' | '.join(names)}:\n\n![{result.room}](pictures/{name})\n")
+    parts.append(_cleaning(results))
     parts.append(_attempts(results))
     rewrite(file, HEADING, "\n".join(parts))
+
+
+def _cleaning(results: Sequence[RoomResult]) -> str:
+    """What cleaning did to every scan."""
+    scans = {
+        f"{result.room}.{kind}": figures
+        for result in results
+        for kind, figures in result.cleaning.items()
+    }
+    names = list(dict.fromkeys(name for figures in scans.values() for name in figures))
+    lines = [
+        "### Cleaning\n",
+        "Share of each label that is gone, without any box: from the E57 the station of each",
+        "point is known, from the merged PLY it is not. Mixed pixels count where they lie over",
+        "10 mm off the true surface. `lost`: of the true area that a station sees and that had a",
+        "point within 10 mm, what has none any more.\n",
+        f"| | {' | '.join(scans)} |",
+        f"|---|{'---|' * len(scans)}",
+    ]
+    for name in names:
+        cells = [f"{scans[scan][name]:.4f}" if name in scans[scan] else "" for scan in scans]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join([*lines, ""])
 
 
 def _attempts(results: Sequence[RoomResult]) -> str:

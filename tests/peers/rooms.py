@@ -71,7 +71,7 @@ class BenchRoom:
 
     def cloud(self) -> tuple[Float32, UInt8]:
         """Points, metres, and sRGB colours of the scan, within the publisher's boxes."""
-        points, colors = _read(self.scan)
+        points, colors = read_scan(self.scan)
         kept = (
             np.ones(len(points), dtype=np.bool_) if self.keep is None else self.keep.holds(points)
         )
@@ -110,7 +110,8 @@ def _boxes(told: Sequence[dict[str, Sequence[float]]]) -> Iterator[Box]:
     return (Box(np.array(each["min"], float), np.array(each["max"], float)) for each in told)
 
 
-def _read(scan: Path) -> tuple[Float32, UInt8]:
+def read_scan(scan: Path) -> tuple[Float32, UInt8]:
+    """Points, metres, and sRGB colours of a PLY, or of all scans of an E57."""
     if scan.suffix == ".ply":
         import open3d as o3d
 

@@ -27,22 +27,25 @@ def gallery_tour(gallery: Path, scratch: Path) -> Path:
     return folder
 
 
-def built(tour: Path, method: str, room: str, scratch: Path) -> Path | str:
-    """The site of a tour of one room, made by a method; why not, where the method refuses.
+def built(tour: Path, name: str, room: str, scratch: Path, method: str | None = None) -> Path | str:
+    """The site of a tour of one room; why not, where it cannot be built.
 
     Args:
         tour: With scans and tour.toml.
-        method: For ``room.surface.method``.
+        name: Of the variant.
         room: To be built.
         scratch: Keeps the variant's folder, and so its cache.
+        method: For ``room.surface.method``; none: ``name``, "": as the tour says.
     """
-    folder = scratch / "variants" / f"{room}-{method}"
+    folder = scratch / "variants" / f"{room}-{name}"
     folder.mkdir(parents=True, exist_ok=True)
-    for name in ("scans", "texts"):
-        if (tour / name).exists():
-            _link(folder / name, tour / name)
+    for part in ("scans", "texts"):
+        if (tour / part).exists():
+            _link(folder / part, tour / part)
     told = alone((tour / "tour.toml").read_text(encoding="utf-8"), room)
-    (folder / "tour.toml").write_text(with_method(told, method), encoding="utf-8")
+    chosen = name if method is None else method
+    told = with_method(told, chosen) if chosen else told
+    (folder / "tour.toml").write_text(told, encoding="utf-8")
     program = Path(sys.executable).with_name("tourgen")
     ran = subprocess.run(
         [program, "build", str(folder)], check=False, stderr=subprocess.PIPE, text=True

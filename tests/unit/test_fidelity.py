@@ -12,6 +12,7 @@ import picture_score
 import planes
 import plaque
 import pytest
+import report
 import score
 import sections
 import surface_score
@@ -193,3 +194,34 @@ def test_a_variant_differs_by_its_method_alone() -> None:
     expected.pop("surface", None)
     assert room == expected
     assert variant["tour"]["start"] == "chamber2"
+
+
+def result(mine: float, theirs: float, pictures: dict[str, list[np.ndarray]]) -> report.RoomResult:
+    return report.RoomResult(
+        "hall",
+        {"published": {"f_score_5mm": mine}, "Open3D Poisson": {"f_score_5mm": theirs}},
+        {"Open3D Poisson": "depth 9, cut 5 %"},
+        [("Open3D Poisson", "depth 9, cut 5 %", {"f_score_5mm": theirs})],
+        {"crust": "too many points"},
+        {"ply": {"stray": 0.5}},
+        pictures,
+    )
+
+
+def test_a_room_is_won_by_the_higher_score() -> None:
+    assert result(0.91, 0.9, {}).won
+    assert not result(0.9, 0.91, {}).won
+
+
+def test_the_report_shows_scores_refusals_and_pictures(tmp_path: Path) -> None:
+    views = [np.full((54, 96, 3), 90, np.uint8)] * 10
+    pictures = dict.fromkeys(("truth", "published", "Open3D Poisson"), views)
+    report.write([result(0.91, 0.9, pictures)], tmp_path / "benchmarks.md")
+    told = (tmp_path / "benchmarks.md").read_text(encoding="utf-8")
+    assert "| f_score_5mm | 0.9100 | 0.9000 |" in told
+    assert "`crust` refuses: too many points." in told
+    assert "| Open3D Poisson | depth 9, cut 5 % | 0.9000 |" in told
+    assert "| stray | 0.5000 |" in told
+    for number in report.SHOWN_CAMERAS:
+        assert (tmp_path / "pictures" / f"fidelity-hall-{number}.webp").exists()
+        assert f"pictures/fidelity-hall-{number}.webp" in told
