@@ -124,6 +124,27 @@ class TexturedMesh:
 
 
 @dataclass(frozen=True, slots=True)
+class Panorama:
+    """A spherical picture and where it was taken, whole or a part of the sphere.
+
+    Its middle looks along the picture's x axis, y points left and z up: a pixel's centre at column
+    c and row r has azimuth (w / 2 - c - 0.5) * pixel_rad[0] and elevation (h / 2 - r - 0.5) *
+    pixel_rad[1].
+
+    Attributes:
+        position: (3,) float64, the lens, metres from the room's origin.
+        rotation: (3, 3) float64, from the picture's axes to the room's.
+        image: (h, w, 3) uint8, sRGB; black where there is no picture.
+        pixel_rad: Azimuth and elevation that a pixel spans, radians.
+    """
+
+    position: Float64
+    rotation: Float64
+    image: UInt8
+    pixel_rad: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class View:
     """A camera.
 

@@ -1,9 +1,10 @@
 """How true colours are: ``python tests/peers/picture_points.py TOUR [--room ID]``.
 
-Quicker than a browser: points spread evenly over the leaf tiles take their colour from the tile's
-picture and are held against the true texture where the built surface stands for the true one. One gain a channel is
-fitted first, since no scan tells how bright a room is. Looking glasses and what glows are left
-out, and so is what lies more than 30 mm from the truth.
+Quicker than a browser: places spread evenly over the leaf tiles take their colours from the tile's
+picture and are held against the true texture where the built surface stands for the true one. What
+is compared are means over squares of 5 mm, about what a screen's pixel shows from two metres. One
+gain a channel is fitted first, since no scan tells how bright a room is. Looking glasses and what
+glows are left out, and so is what lies more than 30 mm from the truth.
 
 psnr_db       Of the colours on surfaces that a station sees.
 psnr_all_db   The same with what no station sees: there the tour can only guess.
@@ -29,7 +30,9 @@ from score import Truth, markdown
 from tourgen.geometry import Float32, Float64, Int32, TexturedMesh, UInt8
 from tourgen.simulation.light import rays_of
 
-SAMPLES = 400_000
+SAMPLES = 50_000
+PIXEL_M = 0.005
+PIXEL_SAMPLES = 4  # along each side
 NEAR_M = 0.03
 GLOW = 254
 SEAM_CELL_M = 0.1
@@ -98,27 +101,42 @@ def glb(path: Path) -> Leaf:
     )
 
 
-def spread(leaves: Sequence[Leaf], count: int) -> tuple[Float64, Float64, Float64]:
-    """(n, 3) places spread evenly over the leaves, their normals, and their colours, 0 to 255."""
+def spread(leaves: Sequence[Leaf]) -> tuple[Float64, Float64, Float64]:
+    """Squares spread evenly over the leaves.
+
+    Returns:
+        (n, k, 3) places in each of n squares, (n, 3) normals, (n, k, 3) colours, 0 to 255.
+    """
     rng = np.random.default_rng(3)
     areas = []
     for leaf in leaves:
         a, b, c = (leaf.vertices[leaf.faces[:, k]] for k in range(3))
         areas.append(np.linalg.norm(np.cross(b - a, c - a), axis=1))
     total = sum(float(area.sum()) for area in areas)
-    places, normals, colors = [], [], []
+    side = ((np.arange(PIXEL_SAMPLES) + 0.5) / PIXEL_SAMPLES - 0.5) * PIXEL_M
+    square = np.stack(np.meshgrid(side, side), -1).reshape(-1, 2)
+    found = []
     for leaf, area in zip(leaves, areas, strict=True):
-        n = rng.poisson(count * area.sum() / total)
+        n = rng.poisson(SAMPLES * area.sum() / total)
         face = rng.choice(len(area), n, p=area / area.sum())
-        share = rng.dirichlet((1, 1, 1), n)
         at = leaf.faces[face]
         corners = leaf.vertices[at]
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        places.append(np.einsum("nc,ncx->nx", share, corners))
-        normals.append(across / np.linalg.norm(across, axis=1, keepdims=True))
-        uv = np.einsum("nc,ncx->nx", share, leaf.uv[at].astype(np.float64))
-        colors.append(bilinear(leaf.picture, uv))
-    return np.concatenate(places), np.concatenate(normals), np.concatenate(colors)
+        edges = corners[:, 1:] - corners[:, :1]
+        across = np.cross(edges[:, 0], edges[:, 1])
+        normals = across / np.linalg.norm(across, axis=1, keepdims=True)
+        right = edges[:, 0] / np.linalg.norm(edges[:, 0], axis=1, keepdims=True)
+        frame = np.stack([right, np.cross(normals, right)], axis=1)
+        away = square @ frame  # (n, k, 3)
+        share = rng.dirichlet((1, 1, 1), n)
+        middle = np.einsum("nc,ncx->nx", share, corners)
+        uv = leaf.uv[at].astype(np.float64)
+        # The picture's own place of each sample: the face's plane carried on past its edges.
+        steps = away @ np.linalg.pinv(edges)
+        places = np.einsum("nc,ncx->nx", share, uv)[:, None] + steps @ (uv[:, 1:] - uv[:, :1])
+        shown = bilinear(leaf.picture, places.reshape(-1, 2)).reshape((*places.shape[:2], 3))
+        found.append((middle[:, None] + away, normals, shown))
+    places, normals, shown = (np.concatenate(each) for each in zip(*found, strict=True))
+    return places, normals, shown
 
 
 def bilinear(picture: UInt8, uv: Float64) -> Float64:
@@ -202,8 +220,14 @@ def figures(
         points: (p, 3) the scan, metres, and
         owner: (p,) its stations, where they are known: seams are looked for between them.
     """
-    places, normals, shown = spread(leaves, SAMPLES)
-    colors, judged, seen = true.facing(places, normals)
+    squares, normals, shown = spread(leaves)
+    count = squares.shape[1]
+    each = [
+        all_.reshape(len(squares), count, *all_.shape[1:])
+        for all_ in true.facing(squares.reshape(-1, 3), np.repeat(normals, count, axis=0))
+    ]
+    colors, judged, seen = each[0].mean(1), each[1].all(1), each[2].all(1)
+    places, shown = squares.mean(1), shown.mean(1)
     seen &= judged
     gain = gain_of(shown[seen], colors[seen])
     off = shown * gain - colors

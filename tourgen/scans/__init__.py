@@ -1,7 +1,7 @@
 """Scans: one file per format, all read into chunks of points."""
 
 from tourgen.scans.open import FORMATS, open_scan
-from tourgen.scans.room import ReadFacts, read_room
+from tourgen.scans.room import ReadFacts, read_panoramas, read_room
 from tourgen.scans.scan import Chunk, Scan
 
-__all__ = ["FORMATS", "Chunk", "ReadFacts", "Scan", "open_scan", "read_room"]
+__all__ = ["FORMATS", "Chunk", "ReadFacts", "Scan", "open_scan", "read_panoramas", "read_room"]

@@ -16,7 +16,8 @@ from typing import Any, Final
 import numpy as np
 
 from tourgen.errors import InputError
-from tourgen.geometry import Float64, UInt8
+from tourgen.geometry import Float64, Panorama, UInt8
+from tourgen.scans.e57_images import count_of, panoramas_of
 from tourgen.scans.scan import CHUNK_POINTS, Chunk, Source, color_range, to_8_bit
 
 _CARTESIAN: Final = ("cartesianX", "cartesianY", "cartesianZ")
@@ -59,6 +60,7 @@ def open_e57(path: Path) -> Source:
     """
     with _image_file(path) as file:
         parts = _parts(file)
+        pictures = count_of(_pictures(file))
     stations = [part.translation for part in parts if part.station >= 0]
     without = [part.index + 1 for part in parts if not part.has_color]
     some = without and len(without) < len(parts)
@@ -68,7 +70,19 @@ def open_e57(path: Path) -> Source:
         stations=np.array(stations, dtype=np.float64).reshape(-1, 3),
         read=lambda: _read(path, parts),
         warnings=(f"scan {', '.join(map(str, without))} in it has no colour",) if some else (),
+        panorama_count=pictures,
+        read_panoramas=lambda: _read_panoramas(path),
     )
+
+
+def _pictures(file: Any) -> Any:
+    root = file.root()
+    return root["images2D"] if root.isDefined("images2D") else ()
+
+
+def _read_panoramas(path: Path) -> tuple[Panorama, ...]:
+    with _image_file(path) as file:
+        return panoramas_of(_pictures(file), _pose)
 
 
 @contextmanager

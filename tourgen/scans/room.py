@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from tourgen.errors import InputError
-from tourgen.geometry import Float64, PointCloud
+from tourgen.geometry import Float64, Panorama, PointCloud
 from tourgen.scans.scan import Chunk, Scan
 
 NEAR_M: Final = 100.0
@@ -106,6 +106,23 @@ def read_room(
     cloud = PointCloud(origin, points[:used], colors[:used], station[:used])
     stations = np.concatenate([np.empty((0, 3)), *(scan.stations for scan in scans)]) - origin
     return cloud, stations, facts
+
+
+def read_panoramas(scans: Sequence[Scan], origin: Float64) -> tuple[Panorama, ...]:
+    """The panoramas of a room's scans that have a pose.
+
+    Args:
+        scans: In one frame.
+        origin: (3,) of the room's cloud; positions come out from there.
+
+    Raises:
+        InputError: A scan cannot be read.
+    """
+    return tuple(
+        replace(each, position=each.position - origin)
+        for scan in scans
+        for each in scan.panoramas()
+    )
 
 
 def _numbered(scans: Sequence[Scan]) -> Iterator[Chunk]:

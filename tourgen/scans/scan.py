@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from tourgen.errors import InputError
-from tourgen.geometry import Float64, UInt8
+from tourgen.geometry import Float64, Panorama, UInt8
 
 CHUNK_POINTS: Final = 200_000
 """Points read at a time: 20 MB at work, whatever the size of the scan; larger chunks leave the
@@ -56,6 +56,8 @@ class Source:
         stations: (s, 3) float64, where the scanner stood, as far as the file tells.
         read: Yields the points in the file's own unit and axes, invalid ones possibly among them.
         warnings: What the publisher should know, one line each.
+        panorama_count: Pictures with a pose, as the header says.
+        read_panoramas: Reads those that can be decoded, in the file's own unit and axes.
     """
 
     point_count: int
@@ -63,6 +65,8 @@ class Source:
     stations: Float64
     read: Callable[[], Iterator[Chunk]]
     warnings: tuple[str, ...] = ()
+    panorama_count: int = 0
+    read_panoramas: Callable[[], tuple[Panorama, ...]] = tuple
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +94,11 @@ class Frame:
         if not self.shift.any() and np.array_equal(self.matrix, np.eye(3)):
             return points
         return points @ self.matrix.T + self.shift
+
+    def turn(self, rotation: Float64) -> Float64:
+        """(3, 3) rotation into the file's axes to one into the room's."""
+        unit_m = np.cbrt(np.linalg.det(self.matrix))
+        return np.asarray(self.matrix / unit_m @ rotation)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +136,25 @@ class Scan:
                 yield self._placed(raw)
         except InputError as error:
             raise named(error, self.name) from None
+
+    def panoramas(self) -> tuple[Panorama, ...]:
+        """Read the pictures that have a pose; positions are in the frame of the scan.
+
+        Raises:
+            InputError: The file breaks off, or cannot be read.
+        """
+        try:
+            found = self.source.read_panoramas()
+        except InputError as error:
+            raise named(error, self.name) from None
+        return tuple(
+            replace(
+                each,
+                position=self.frame.apply(each.position[None])[0],
+                rotation=self.frame.turn(each.rotation),
+            )
+            for each in found
+        )
 
     def _placed(self, raw: Chunk) -> Chunk:
         station = np.zeros_like(raw.station) if self.one_station else raw.station
