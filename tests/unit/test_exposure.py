@@ -61,6 +61,17 @@ def test_colours_of_all_stations_agree_after_it() -> None:
     assert np.abs(off).max() < 2.5
 
 
+def test_a_remnant_of_unknown_station_joins_the_others() -> None:
+    cloud = exposed_wall()
+    station = cloud.station.copy()
+    station[::20] = -1
+    even = exposure(
+        PointCloud(cloud.origin, cloud.points, cloud.colors, station), STATIONS, Settings()
+    )
+    off = even.colors - painted(even.points)
+    assert np.abs(off[even.station < 0].mean(0) - off[even.station >= 0].mean(0)).max() < 1
+
+
 def test_one_bad_pair_among_many_is_outvoted() -> None:
     pairs = np.array([(a, b) for a in range(5) for b in range(a)])
     true = np.linspace(-0.1, 0.1, 5)

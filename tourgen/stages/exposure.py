@@ -65,7 +65,7 @@ def exposure(cloud: PointCloud, stations: Float64, settings: Settings) -> PointC
     """The points in colours of one exposure, without glare where another station tells better.
 
     Args:
-        cloud: n points; those of unknown station (-1) stay as they are.
+        cloud: n points; those of unknown station (-1) share a gain of their own.
         stations: (s, 3) metres from the cloud's origin.
         settings: See there.
 
@@ -76,10 +76,11 @@ def exposure(cloud: PointCloud, stations: Float64, settings: Settings) -> PointC
     count = len(stations)
     if count < 2 or not 0 <= cloud.station.max(initial=-1) < count:
         return cloud
-    gain = gains(cloud.points, cloud.colors, cloud.station, count, settings)
-    colors = cloud.colors.copy()
-    for station in range(count):
-        own = cloud.station == station
+    owner = np.where(cloud.station < 0, count, cloud.station).astype(np.int16)
+    gain = gains(cloud.points, cloud.colors, owner, count + 1, settings)
+    colors = np.empty_like(cloud.colors)
+    for station in range(count + 1):
+        own = owner == station
         table = np.clip(np.rint(np.arange(256)[:, None] / gain[station]), 0, 255).astype(np.uint8)
         colors[own] = np.stack([table[cloud.colors[own, k], k] for k in range(3)], axis=1)
     even = PointCloud(cloud.origin, cloud.points, colors, cloud.station)
@@ -99,7 +100,7 @@ def gains(
     Args:
         points: (n, 3) metres.
         colors: (n, 3) sRGB.
-        station: (n,) owner, -1 where unknown.
+        station: (n,) owner, 0 to s - 1.
         count: s
         settings: See there.
 
@@ -107,7 +108,7 @@ def gains(
         Factors whose geometric mean is 1 over each set of stations that see common places.
     """
     dark, bright = settings.tones
-    usable = (station >= 0) & (colors.min(1) >= dark) & (colors.max(1) <= bright)
+    usable = (colors.min(1) >= dark) & (colors.max(1) <= bright)
     cells = _cells(points[usable], station[usable], count, settings.cell_m)
     means = cells.means(colors[usable])
     keep = cells.sizes >= settings.cell_points
@@ -226,13 +227,19 @@ def _about_burnt(cloud: PointCloud, stations: Float64, settings: Settings) -> Bo
             continue
         way = cloud.points[own] - station.astype(np.float32)
         way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
-        burnt = way[cloud.colors[own].min(1) >= settings.burnt]
-        if not len(burnt):
+        burnt = cloud.colors[own].min(1) >= settings.burnt
+        if not burnt.any():
             continue
-        seeds = np.unique(np.rint(burnt / np.radians(_DIRECTION_DEG)).astype(np.int16), axis=0)
-        directions = seeds * np.radians(_DIRECTION_DEG)
-        distance, _ = cKDTree(directions).query(way, distance_upper_bound=reach)
-        near[own[np.isfinite(distance)]] = True
+        steps = np.rint(way / np.radians(_DIRECTION_DEG)).astype(np.int64) + 128
+        key, place = np.unique(
+            (steps[:, 0] * 256 + steps[:, 1]) * 256 + steps[:, 2], return_inverse=True
+        )
+        cells = np.stack([key >> 16, key >> 8 & 255, key & 255], axis=1).astype(np.float32)
+        seeds = cells[np.unique(place[burnt])]
+        distance, _ = cKDTree(seeds).query(
+            cells, distance_upper_bound=reach / np.radians(_DIRECTION_DEG)
+        )
+        near[own[np.isfinite(distance)[place]]] = True
     return near
 
 

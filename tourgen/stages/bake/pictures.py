@@ -1,12 +1,15 @@
 """The colours that panoramas and points show at texels, agreed upon between them.
 
 Each picture that sees a texel gives a colour, a trust, and how near its pixels lie; the points
-give a colour too. The median, weighted by trust, is what most of the evidence says; what is far
-from it, a passer-by, a highlight, a surface beside the right one, loses its weight, and the others
-are blended, the nearest pixels most.
+give a colour too. The one of median brightness, weighted by trust, is what most of the evidence
+says; what is far from it, a passer-by, a highlight, a surface beside the right one, loses its
+weight, and the others are blended, the nearest pixels most.
 
-Tried and rejected, of 255 over the demo's first chamber in squares of 5 mm: pictures as so many
-more points, 24.9 dB against 27.1; the nearest picture alone, 26.3; cubic interpolation, 27.05.
+Tried and rejected, over a tenth of the demo's first chamber, means of squares of 5 mm held
+against the truth: pictures as so many more points, 24.9 dB against 27.3 dB; the nearest picture
+alone, 26.3; pixels blended across without regard to distance, 27.1; points only where pictures
+fail, 27.0, and on the stair 27.0 against 29.0, since a hair's breadth of pose decides what a pixel
+beside an edge shows.
 """
 
 from __future__ import annotations
@@ -83,14 +86,10 @@ def agreed(shown: Float32, vote: Float32, weight: Float32) -> Float32:
     Returns:
         (n, 3) colours.
     """
-    half = vote.sum(0) / 2
-    off = np.zeros(vote.shape, np.float32)
-    for channel in range(3):
-        values = shown[..., channel]
-        order = values.argsort(0)
-        below = np.take_along_axis(vote, order, 0).cumsum(0)
-        middle = np.take_along_axis(order, (below >= half).argmax(0)[None], 0)
-        off = np.maximum(off, np.abs(values - np.take_along_axis(values, middle, 0)))
+    order = shown.sum(2).argsort(0)
+    below = np.take_along_axis(vote, order, 0).cumsum(0)
+    middle = np.take_along_axis(order, (below >= below[-1] / 2).argmax(0)[None], 0)
+    off = np.abs(shown - np.take_along_axis(shown, middle[..., None], 0)).max(2)
     trusted = weight / (1 + (off / np.float32(_APART)) ** 4)
     blend = np.einsum("vn,vnc->nc", trusted, shown) / np.maximum(trusted.sum(0), 1e-12)[:, None]
     return np.asarray(blend, np.float32)
