@@ -111,7 +111,7 @@ def _unwrapped(
     meshes.add_mesh(pymeshlab.Mesh(vertices, faces))
     meshes.meshing_decimation_quadric_edge_collapse(targetfacenum=count, preservenormal=True)
     meshes.compute_texcoord_parametrization_triangle_trivial_per_wedge(
-        textdim=TEXTURE_PX, border=1, method="Space-optimizing"
+        textdim=TEXTURE_PX, border=2, method="Space-optimizing"
     )
     mesh = meshes.current_mesh()
     corners = mesh.face_matrix()

@@ -3,9 +3,10 @@
 Every peer gets the scan that tourgen gets, cropped to the same boxes of tour.toml. Each then
 drops outliers with its own filter and finds normals with its own; the normals are turned towards
 the nearest true station, which is more than a merged scan tells and than either program can do
-by itself. Poisson's invented surface is cut by density, as Open3D's manual advises: 5 % of the
-vertices rather than the 1 % shown there, which suits the peers better (chamber1, depth 9, F-score
-at 5 mm: 0 % 0.855, 1 % 0.877, 2 % 0.885, 5 % 0.890, 10 % 0.875, 20 % 0.829). A peer's score in a
+by itself. Poisson's invented surface is cut by density, as Open3D's manual shows: by 1 % of the
+vertices as there, and by what suits the peers better (chamber1, Open3D, F-score at 5 mm: depth 9,
+0 % 0.855, 1 % 0.877, 2 % 0.885, 5 % 0.890, 10 % 0.875, 20 % 0.829; depth 10, 5 % 0.883, which
+cuts too much there: recall 0.806). A peer's score in a
 room is that of the best of its settings there.
 """
 
@@ -166,12 +167,12 @@ OPEN3D_POISSON, MESHLAB_POISSON = "Open3D Poisson", "PyMeshLab Poisson"
 MESHLAB_BALLS = "PyMeshLab ball pivoting"
 
 ATTEMPTS = (
+    Attempt(OPEN3D_POISSON, "depth 9, cut 1 %", Open3dPoisson(9, 0.01)),
     Attempt(OPEN3D_POISSON, "depth 9, cut 5 %", Open3dPoisson(9, 0.05)),
-    Attempt(OPEN3D_POISSON, "depth 10, cut 5 %", Open3dPoisson(10, 0.05)),
-    Attempt(OPEN3D_POISSON, "depth 11, cut 5 %", Open3dPoisson(11, 0.05)),
+    Attempt(OPEN3D_POISSON, "depth 10, cut 2 %", Open3dPoisson(10, 0.02)),
+    Attempt(MESHLAB_POISSON, "depth 9, cut 1 %", MeshlabPoisson(9, 0.01)),
     Attempt(MESHLAB_POISSON, "depth 9, cut 5 %", MeshlabPoisson(9, 0.05)),
-    Attempt(MESHLAB_POISSON, "depth 10, cut 5 %", MeshlabPoisson(10, 0.05)),
-    Attempt(MESHLAB_POISSON, "depth 11, cut 5 %", MeshlabPoisson(11, 0.05)),
+    Attempt(MESHLAB_POISSON, "depth 10, cut 2 %", MeshlabPoisson(10, 0.02)),
     Attempt(MESHLAB_BALLS, "5 mm apart, radius guessed", MeshlabBallPivoting(5, ())),
     Attempt(MESHLAB_BALLS, "6 mm apart, 10 mm", MeshlabBallPivoting(6, (10,))),
     Attempt(MESHLAB_BALLS, "8 mm apart, 12 and 25 mm", MeshlabBallPivoting(8, (12, 25))),
