@@ -17,10 +17,11 @@ from __future__ import annotations
 import numpy as np
 
 from tourgen.geometry import TexturedMesh, UvMesh
+from tourgen.stages.bake.overlook import VistaSettings, vistas
 from tourgen.stages.bake.pictures import of_pictures
 from tourgen.stages.bake.points import ColorIndex, Settings, color_index, of_points
 from tourgen.stages.bake.texels import spread, texels_of, to_bytes
-from tourgen.stages.bake.vista import Vista, VistaSettings, vistas
+from tourgen.stages.bake.vista import Vista
 
 __all__ = [
     "VERSION",
