@@ -52,6 +52,6 @@ def require_range(name: str, value: float, low: float, high: float) -> None:
     """
     if not low <= value <= high:
         raise InputError(
-            f"surface: {name}: expected {low:g} to {high:g}, found {value:g}",
+            f"surface: {name}: expected {low:.7g} to {high:.7g}, found {value:.7g}",
             "give a value in the range, or leave it out",
         )
