@@ -4,11 +4,16 @@ Orientation, best evidence first:
 
 1. The station that measured the point is known: the normal looks at it.
 2. Stations are known or found, but not which one measured which point: the normal looks at the
-   station that sees the point most squarely; points that no station sees follow their
-   neighbours.
-3. No station: a minimum spanning tree over the tangent planes (Hoppe et al. 1992), on a thinned
-   cloud, since 0.9 million points take 93 s; the whole is then turned so that
-   most normals look inward, as those of a room do.
+   station that sees the point most squarely. Where stations see both sides of much of what they
+   see (15 % of a narrow stair, 0.7 % of two chambers), they look through surfaces too sparse to
+   hide anything, and are not believed.
+3. No station, none that is believed, or a point that none sees: free space is one, and what
+   surfaces see of each other across it, they see from their free sides (``free_side``).
+
+Right normals without given stations, by tests/peers/orientation.py: 99.5 to 99.7 % in three
+rooms. Before: a minimum spanning tree over the tangent planes (Hoppe et al. 1992) took 93 s for
+0.9 million points, and one wrong edge turns all that hangs on it; points that no station sees
+followed the nearest that one sees, so that the underside of a table looked up.
 """
 
 from __future__ import annotations
@@ -20,11 +25,17 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, OrientedCloud, PointCloud
+from tourgen.stages.free_side import face_free_space
 from tourgen.stages.sight import depth_buffer
+from tourgen.stages.spacing import spacing_at
 from tourgen.stages.tangent import tangent_planes
-from tourgen.stages.thin import voxel_groups
 
 VERSION = 2
+_GRAZING, _SQUARE = 0.15, 0.25
+"""Cosines: a point seen at less is not seen; one seen at more from both sides contradicts."""
+_SPACING_SAMPLE = 5_000
+_COARSER = 4
+"""Times that the cells of a depth buffer are doubled for what is near."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,13 +46,14 @@ class Settings:
         first_neighbours: Points of the small first fit of a tangent plane.
         neighbours: Points that the wide, robust fit chooses from.
         sight_cell_deg: Cell of the depth buffers that decide which station sees a point.
-        tree_points: Most points that the spanning tree is grown on.
+        contradicted: Share of points whose two sides are both seen, from which on the stations
+            are believed to look through surfaces that are sparse for their distance.
     """
 
     first_neighbours: int = 12
     neighbours: int = 48
     sight_cell_deg: float = 0.5
-    tree_points: int = 40_000
+    contradicted: float = 0.03
 
 
 def normals(cloud: PointCloud, stations: Float64, settings: Settings) -> OrientedCloud:
@@ -58,11 +70,13 @@ def normals(cloud: PointCloud, stations: Float64, settings: Settings) -> Oriente
     normal = tangent_planes(cloud.points, settings.first_neighbours, settings.neighbours)
     if len(stations) and np.all(cloud.station >= 0):
         _look_at(normal, cloud.points, stations[cloud.station])
-    elif len(stations):
-        seen = _look_at_seeing(normal, cloud.points, stations, settings.sight_cell_deg)
-        _follow(normal, cloud.points, seen)
     else:
-        _spanning_tree(normal, cloud.points, settings)
+        seen, contradicted = _look_at_seeing(
+            normal, cloud.points, stations, settings.sight_cell_deg
+        )
+        if contradicted > settings.contradicted:
+            seen[:] = False
+        face_free_space(cloud.points, normal, seen)
     return OrientedCloud(cloud, normal, stations)
 
 
@@ -73,47 +87,48 @@ def _look_at(normal: Float32, points: Float32, target: Float64) -> None:
 
 def _look_at_seeing(
     normal: Float32, points: Float32, stations: Float64, cell_deg: float
-) -> npt.NDArray[np.bool_]:
-    """Turn each normal to the station that sees its point most squarely; mask of the seen."""
-    best = np.zeros(len(points), np.float32)
+) -> tuple[npt.NDArray[np.bool_], float]:
+    """Turn each normal to the station that sees its point most squarely.
+
+    Returns:
+        Mask of the points seen, and the share of them whose two sides are both seen: a true
+        surface has one free side, so that is how much the stations contradict each other.
+    """
+    front, back = np.zeros((2, len(points)), np.float32)
+    spacing_m = _spacing(points)
     for station in stations:
         ray = station.astype(np.float32) - points
         cosine = np.einsum("ij,ij->i", normal, ray) / np.maximum(np.linalg.norm(ray, axis=1), 1e-6)
         np.clip(cosine, -1, 1, out=cosine)
-        cosine[~depth_buffer(points, station, cell_deg).sees(points, cosine)] = 0
-        best = np.where(np.abs(cosine) > np.abs(best), cosine, best)
-    normal[best < 0] *= -1
-    return np.asarray(np.abs(best) > 0.05)
+        cosine[~_seen(points, cosine, station, cell_deg, spacing_m)] = 0
+        np.maximum(front, cosine, out=front)
+        np.maximum(back, -cosine, out=back)
+    normal[back > front] *= -1
+    seen = np.maximum(front, back) > _GRAZING
+    both = np.minimum(front, back) > _SQUARE
+    return seen, float(both.sum() / max(seen.sum(), 1))
 
 
-def _follow(normal: Float32, points: Float32, seen: npt.NDArray[np.bool_]) -> None:
-    """Turn the normals of unseen points like those of the seen ones around them."""
-    hidden = np.flatnonzero(~seen)
-    if not len(hidden) or not seen.any():
-        return
-    known = np.flatnonzero(seen)
-    nearest = np.arange(1, min(12, len(known)) + 1)
-    distance, near = cKDTree(points[known]).query(points[hidden], k=nearest, workers=-1)
-    weight = 1 / np.maximum(distance, 1e-4)
-    votes = np.einsum("ik,ikj,ij->i", weight, normal[known[near]], normal[hidden])
-    normal[hidden[votes < 0]] *= -1
+def _spacing(points: Float32) -> float:
+    """Median distance between neighbouring points, metres."""
+    chosen = np.random.default_rng(0).permutation(len(points))[:_SPACING_SAMPLE]
+    return float(np.median(spacing_at(cKDTree(points), points[chosen])))
 
 
-def _spanning_tree(normal: Float32, points: Float32, settings: Settings) -> None:
-    import open3d as o3d
+def _seen(
+    points: Float32, cosine: Float32, station: Float64, cell_deg: float, spacing_m: float
+) -> npt.NDArray[np.bool_]:
+    """Mask of the points in sight of a station.
 
-    voxel_m = 0.02
-    order, starts = voxel_groups(points, voxel_m)
-    while len(starts) > settings.tree_points:
-        voxel_m *= 1.3
-        order, starts = voxel_groups(points, voxel_m)
-    sparse = order[starts]
-    pcd = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points[sparse]))
-    pcd.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(12))
-    pcd.orient_normals_consistent_tangent_plane(12)
-    grown = np.asarray(pcd.normals).astype(np.float32)
-    inward = np.median(points[sparse], axis=0) - points[sparse]
-    if np.einsum("ij,ij->i", grown, inward).mean() < 0:
-        grown *= -1
-    _, near = cKDTree(points[sparse]).query(points, workers=-1)
-    normal[np.einsum("ij,ij->i", normal, grown[near]) < 0] *= -1
+    A buffer whose cells are finer than the points lie apart looks through between them: in a
+    narrow stair the nearest surfaces are half a metre away. What is near is drawn once more, on
+    cells twice, four times as wide, until each holds two points across.
+    """
+    away = np.linalg.norm(points - station.astype(np.float32), axis=1)
+    seen = depth_buffer(points, station, cell_deg).sees(points, cosine)
+    for doubling in range(_COARSER):
+        near = points[away < 2 * spacing_m / np.radians(cell_deg * 2**doubling)]
+        if len(near):
+            wider = depth_buffer(near, station, cell_deg * 2 ** (doubling + 1))
+            seen &= wider.sees(points, cosine)
+    return np.asarray(seen)

@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter
 
 from tourgen.geometry import Float32, Float64
 
-VERSION = 2
+VERSION = 3
 _SECTORS = 8
 
 
@@ -31,6 +31,8 @@ class Settings:
             step at the smallest and the largest radius. In three rooms discs gave 0.7 to 3.1,
             all else less than 0.5.
         most: Most stations looked for.
+        clearance_m: Nothing stands this near to a scanner. Round a newel, too, the floor is bare
+            within a ring.
     """
 
     blind_angle_deg: float = 30.0
@@ -38,6 +40,7 @@ class Settings:
     cell_m: float = 0.04
     contrast: float = 0.65
     most: int = 12
+    clearance_m: float = 0.25
 
 
 def find_stations(points: Float32, settings: Settings) -> Float64:
@@ -71,7 +74,9 @@ def find_stations(points: Float32, settings: Settings) -> Float64:
         radius = radii[best[0]]
         centre = low + (np.array(best[1:]) + 0.5) * settings.cell_m
         height = radius / np.tan(np.radians(settings.blind_angle_deg))
-        found.append([*centre, floor_z + height])
+        place = np.array([*centre, floor_z + height])
+        if np.square(points - place.astype(np.float32)).sum(axis=1).min() > settings.clearance_m**2:
+            found.append(place)
         x, y = np.ogrid[: shape[0], : shape[1]]
         near = np.hypot(x - best[1], y - best[2]) < 0.7 * radius / settings.cell_m
         score[:, near] = -np.inf

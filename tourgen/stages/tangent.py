@@ -167,7 +167,7 @@ def _fitted(
     offset: _Columns, normal: Float32, height: Float32, weight: Float32
 ) -> tuple[Float32, Float32]:
     """Weighted least squares of the heights over the plane; new normals, and their heights."""
-    u, v = _tangents(normal)
+    u, v = across(normal)
     a, b = _heights(offset, u), _heights(offset, v)
     total = weight.sum(axis=1, keepdims=True) + np.float32(1e-9)
     weight = weight / total
@@ -203,7 +203,7 @@ def _biweight(square: Float32, limit: np.float32) -> Float32:
     return np.asarray(weight)
 
 
-def _tangents(normal: Float32) -> tuple[Float32, Float32]:
+def across(normal: Float32) -> tuple[Float32, Float32]:
     """Two unit vectors across each normal (Duff et al. 2017)."""
     x, y, z = normal.T
     sign = np.where(z >= 0, np.float32(1), np.float32(-1))
