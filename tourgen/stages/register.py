@@ -13,6 +13,14 @@ What all stations share, nothing here can tell: the room stays where most of the
 that one station that was moved does not carry the others along (least absolute motion, by
 iteratively reweighted least squares). A weak pull toward the poses given holds what no surface
 determines. Poses that would move by less than can be told are left as they are given.
+
+Measured by tests/peers/registration.py, between each two stations, against the true poses: the
+chambers' poses were off by 2.2 mm and 0.009 degrees in the mean and come out within 0.1 mm and
+0.006 degrees, also from 5 cm and 1 degree away; the stair's ten, which see little of each other,
+within 0.5 mm and 0.03 degrees (mean 0.17 mm, 0.013 degrees; given 2.2 mm, 0.014 degrees).
+Rejected: planes without brightness (the stair: 3.3 mm and 0.19 degrees, it turns about its
+newel); voxels of 20 mm and half as many points (the stair: 1.1 mm, 0.05 degrees); the mean of
+all stations held, which tilts the room by a third of what one of three was turned by.
 """
 
 from __future__ import annotations
