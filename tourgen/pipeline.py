@@ -12,21 +12,25 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tourgen import fitting
 from tourgen.cache import Cache, Cost
+from tourgen.fitting import picture, points, surface
+from tourgen.fitting.lengths import corners
 from tourgen.geometry import View
 from tourgen.progress import Listener, Started
 from tourgen.stages import (
     bake,
-    clean,
     entry,
+    exposure,
     floor,
     hygiene,
     levels,
     measure,
     normals,
+    ownership,
     pack,
     poster,
+    register,
+    sift,
     spacing,
     stations,
     thin,
@@ -59,7 +63,7 @@ class RoomRecipe:
     poster: Task[bytes]
     entry: Task[View]
     quality: Task[measure.Quality]
-    summary: Task[fitting.Summary]
+    summary: Task[picture.Summary]
 
     @property
     def goals(self) -> tuple[Task[Any], ...]:
@@ -83,65 +87,89 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
     detail_mm = room.surface.detail_mm
     scanned = task(
         "scan",
-        partial(fitting.read, room, folder),
-        settings=fitting.reading(room),
+        partial(points.read, room, folder),
+        settings=points.reading(room),
         digests=tuple(digests[folder / each.file] for each in room.scans),
-        version=1,
+        version=2,
         libraries=("pye57",),
     )
-    cleaned = task(
-        "clean",
-        fitting.cleaned,
-        scanned,
-        settings=clean.Settings(min_points=room.clean.min_points),
-        version=clean.VERSION,
-        libraries=("scipy",),
-    )
-    spaced = task("spacing", spacing.spacing, cleaned, version=spacing.VERSION)
     stood = task(
         "stations",
-        fitting.stations_of,
+        points.stations_of,
         scanned,
-        cleaned,
         settings=stations.Settings(),
         version=stations.VERSION,
         libraries=("scipy",),
     )
+    owned = task(
+        "ownership",
+        points.owned,
+        scanned,
+        stood,
+        settings=ownership.Settings(),
+        version=ownership.VERSION,
+        libraries=("scipy",),
+    )
+    joined = task(
+        "register",
+        points.registered,
+        owned,
+        settings=register.Settings(),
+        version=register.VERSION,
+        libraries=("scipy",),
+    )
+    sifted = task(
+        "sift",
+        points.sifted,
+        joined,
+        settings=sift.Settings(min_points=room.clean.min_points),
+        version=sift.VERSION,
+        libraries=("scipy",),
+    )
+    cleaned = task(
+        "exposure",
+        points.exposed,
+        sifted,
+        joined,
+        settings=exposure.Settings(),
+        version=exposure.VERSION,
+    )
+    spaced = task("spacing", spacing.spacing, cleaned, version=spacing.VERSION)
     thinned = task(
         "thin",
-        fitting.thinned,
+        points.thinned,
         cleaned,
         spaced,
-        settings=fitting.Thinning(detail_mm, room.clean.thin_mm),
+        settings=points.Thinning(detail_mm, room.clean.thin_mm),
         version=thin.VERSION,
     )
     turned = task(
         "normals",
-        normals.normals,
+        points.oriented,
         thinned,
-        stood,
+        joined,
         settings=normals.Settings(),
         version=normals.VERSION,
         libraries=("open3d", "scipy"),
     )
-    oriented = task("floor", fitting.floored, turned, spaced, version=floor.VERSION)
+    oriented = task("floor", points.floored, turned, spaced, version=floor.VERSION)
     solved = task(
         "surface",
-        fitting.solved,
+        surface.solved,
         oriented,
         spaced,
-        settings=fitting.Solving(detail_mm, room.surface.depth),
+        settings=surface.Solving(detail_mm, room.surface.depth),
         version=poisson.VERSION,
         libraries=("open3d",),
     )
     trimmed = task(
         "trim",
-        fitting.trimmed,
+        surface.trimmed,
         solved,
         oriented,
         cleaned,
         spaced,
-        settings=fitting.Trimming(fitting.boxes(room.closed)),
+        settings=surface.Trimming(tuple(corners(box) for box in room.closed)),
         version=trim.VERSION,
         libraries=("scipy",),
     )
@@ -155,10 +183,10 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
     )
     simplified = task(
         "levels",
-        fitting.levelled,
+        surface.levelled,
         sound,
         spaced,
-        settings=fitting.Detail(detail_mm),
+        settings=surface.Detail(detail_mm),
         version=levels.VERSION,
         libraries=("fast-simplification",),
     )
@@ -172,44 +200,47 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
     )
     unwrapped = task(
         "unwrap",
-        fitting.unwrapped,
+        picture.unwrapped,
         tree,
         cleaned,
-        settings=fitting.Texels(room.texture.texel_mm),
+        settings=picture.Texels(room.texture.texel_mm),
         version=unwrap.VERSION,
         libraries=("xatlas", "scipy"),
     )
     baked = task(
         "bake",
-        fitting.baked,
+        picture.baked,
         unwrapped,
         oriented,
         cleaned,
+        scanned,
+        joined,
+        simplified,
         settings=bake.Settings(),
         version=bake.VERSION,
-        libraries=("scipy",),
+        libraries=("open3d", "scipy"),
     )
     files = task(
         "pack",
-        fitting.packed,
+        picture.packed,
         tree,
         baked,
-        settings=fitting.Packing(room.texture.quality),
+        settings=picture.Packing(room.texture.quality),
         version=pack.VERSION,
         libraries=("DracoPy", "pygltflib", "pillow"),
     )
     entered = task(
         "entry",
-        fitting.entered,
+        picture.entered,
         simplified,
-        stood,
-        settings=fitting.entering(room.start),
+        joined,
+        settings=picture.entering(room.start),
         version=entry.VERSION,
         libraries=("open3d",),
     )
     pictured = task(
         "poster",
-        fitting.pictured,
+        picture.pictured,
         tree,
         baked,
         entered,
@@ -219,14 +250,16 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
     )
     measured = task(
         "measure",
-        fitting.measured,
+        surface.measured,
         simplified,
         cleaned,
         spaced,
         version=measure.VERSION,
         libraries=("open3d", "scipy"),
     )
-    summary = task("summary", fitting.summarised, scanned, cleaned, stood, tree, files, version=1)
+    summary = task(
+        "summary", picture.summarised, scanned, cleaned, joined, sifted, tree, files, version=2
+    )
     scan_mb = sum((folder / each.file).stat().st_size for each in room.scans) / 1e6
     return RoomRecipe(room, scan_mb, files, pictured, entered, measured, summary)
 
@@ -251,7 +284,7 @@ class RoomResult:
     poster: bytes
     entry: View
     quality: measure.Quality
-    summary: fitting.Summary
+    summary: picture.Summary
     costs: Mapping[str, Cost]
     ran: tuple[str, ...]
 

@@ -17,9 +17,10 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 #: Seconds a megabyte of scan, as the demo's rooms of 13 to 23 MB took on two cores; 0.02 for a
 #: stage not named. A room of 228 MB took as much in cleaning, half as much in what follows.
 _SECONDS_PER_MB = {
-    "clean": 0.8, "spacing": 0.1, "normals": 0.4, "floor": 0.05, "surface": 3.0, "trim": 0.4,
-    "hygiene": 0.4, "levels": 0.3, "tiles": 0.1, "unwrap": 1.7, "bake": 1.6, "pack": 0.15,
-    "poster": 0.3, "measure": 0.1,
+    "stations": 0.1, "ownership": 1.2, "register": 1.2, "sift": 1.5, "exposure": 0.1,
+    "spacing": 0.1, "normals": 1.2, "floor": 0.05, "surface": 3.0, "trim": 0.4, "hygiene": 0.4,
+    "levels": 0.3, "tiles": 0.1, "unwrap": 1.7, "bake": 1.6, "pack": 0.15, "poster": 0.3,
+    "measure": 0.1,
 }  # fmt: skip
 
 

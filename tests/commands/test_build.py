@@ -51,7 +51,7 @@ def test_a_change_reaches_only_what_follows_it(
     plan = told(capsys, "plan", str(box_copy))
     assert plan["left"] == {}
     assert "detail_mm 30.0 -> 40.0" in " ".join(plan["right"].values())
-    assert not {"scan", "clean", "spacing", "stations"} & set(plan["right"])
+    assert not {"scan", "sift", "spacing", "stations"} & set(plan["right"])
     report = told(capsys, "build", str(box_copy))
     assert report["rooms"]["left"]["ran"] == []
     assert report["rooms"]["right"]["ran"] == list(plan["right"])

@@ -1,6 +1,6 @@
 """How true the normals are: ``python tests/peers/orientation.py TOUR [--room ID] [--given]``.
 
-The merged scans of a demo tour go through clean, thin and normals as in a build, without
+The merged scans of a demo tour go through sift, thin and normals as in a build, without
 stations (``--given``: with those of the truth, not told which point is whose), and the normals
 are held against what ``tourgen.simulate`` wrote beside the scans.
 
@@ -26,11 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tourgen import fitting
+from tourgen.fitting import points as fitting
 from tourgen.geometry import Float32, Float64, PointCloud
 from tourgen.scans import open_scan, read_room
 from tourgen.simulation.light import ray_scene, rays_of
-from tourgen.stages import clean, normals, spacing, stations
+from tourgen.stages import normals, sift, spacing, stations
 from tourgen.tour import Room, load_tour, open_scans
 
 GOAL_RIGHT, GOAL_SECONDS_A_MILLION = 0.995, 10.0
@@ -99,7 +99,7 @@ def _raw_points(path: Path) -> Float32:
 def prepared(room: Room, folder: Path) -> tuple[PointCloud, Float32]:
     """The cloud that a build estimates normals of, and the cleaned one that stations show in."""
     cloud, _, _ = read_room(open_scans(room, folder), room.keep, room.remove)
-    cleaned = clean.clean(cloud, clean.Settings(min_points=room.clean.min_points))
+    cleaned = sift.sift(cloud, np.empty((0, 3)), sift.Settings()).cloud
     thinning = fitting.Thinning(room.surface.detail_mm, room.clean.thin_mm)
     return fitting.thinned(cleaned, spacing.spacing(cleaned), thinning), cleaned.points
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tourgen.errors import InputError
 from tourgen.geometry import OrientedCloud, PointCloud
-from tourgen.stages import clean, floor, normals, sight, spacing, stations, thin
+from tourgen.stages import floor, normals, sift, sight, spacing, stations, thin
 
 ROOM_M = np.array([4.0, 5.0, 2.6])
 
@@ -52,7 +52,11 @@ def scanned_box(eyes: np.ndarray, rays: int) -> np.ndarray:
     return np.concatenate(found)
 
 
-# ------------------------------------------------------------------ clean
+# ------------------------------------------------------------------ sift
+
+
+def _sifted(points: np.ndarray) -> PointCloud:
+    return sift.sift(cloud(points), np.empty((0, 3)), sift.Settings()).cloud
 
 
 def test_strays_and_islands_go_and_the_room_stays() -> None:
@@ -60,7 +64,7 @@ def test_strays_and_islands_go_and_the_room_stays() -> None:
     rng = np.random.default_rng(3)
     strays = rng.uniform([-1.5, -2, 0.5], [1.5, 2, 2.1], (100, 3))
     island = rng.normal([9, 0, 1], 0.02, (80, 3))
-    kept = clean.clean(cloud(np.concatenate([points, strays, island])), clean.Settings())
+    kept = _sifted(np.concatenate([points, strays, island]))
     is_room = np.isin(kept.points[:, 0], np.float32(points[:, 0]))
     assert (~is_room).sum() <= 3
     assert is_room.sum() > 0.995 * len(points)
@@ -69,13 +73,13 @@ def test_strays_and_islands_go_and_the_room_stays() -> None:
 def test_density_alone_makes_no_stray() -> None:
     dense = np.random.default_rng(0).random((40_000, 3)) * [1, 1, 0]
     sparse = np.random.default_rng(1).random((2_000, 3)) * [2, 1, 0] + [1, 0, 0]
-    kept = clean.clean(cloud(np.concatenate([dense, sparse])), clean.Settings())
+    kept = _sifted(np.concatenate([dense, sparse]))
     assert len(kept) > 0.995 * 42_000
 
 
 def test_too_few_points_are_told() -> None:
     with pytest.raises(InputError, match="expected at least 10000 points, found 50"):
-        clean.clean(cloud(box_points(50)[0]), clean.Settings())
+        _sifted(box_points(50)[0])
 
 
 # ------------------------------------------------------------------ thin, spacing

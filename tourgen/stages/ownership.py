@@ -36,6 +36,7 @@ _TURN = 2j * np.pi
 _HIGHEST_DEG = 75.0
 """Windows nearer the zenith hold all azimuths."""
 _BLOCK = 1_000_000
+_SAMPLE = 600_000
 
 Complex = npt.NDArray[np.complex128]
 
@@ -57,7 +58,7 @@ class Settings:
         polish_points: Points of the cloud drawn for the last fit.
     """
 
-    step_deg: tuple[float, float] = (0.02, 1.2)
+    step_deg: tuple[float, float] = (0.02, 2.0)
     window_deg: float = 5.0
     windows: int = 150
     window_points: int = 100
@@ -240,7 +241,7 @@ def _windows(
     points: Float32, place: Float64, settings: Settings, rng: np.random.Generator
 ) -> _Windows | None:
     """Windows of points that can be seen from a place; None where there are too few."""
-    sample = points[rng.permutation(len(points))[:2_000_000]]
+    sample = points[rng.permutation(len(points))[:_SAMPLE]]
     elevation, azimuth, reach = _angles(sample, place)
     near = _nearest(elevation, azimuth, reach)
     order = np.flatnonzero(near)[np.argsort(elevation[near])]

@@ -1,0 +1,206 @@
+"""Fitting the picture: unwrapping, baking and packing tiles, the first view, and figures."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tourgen.fitting.lengths import Corner
+from tourgen.fitting.points import RoomScan, moved
+from tourgen.geometry import Float64, OrientedCloud, PointCloud, TexturedMesh, Tile, UvMesh, View
+from tourgen.scans import ReadFacts
+from tourgen.stages import bake, entry, levels, pack, poster, register, sift, unwrap
+from tourgen.stages.mesh_arrays import face_areas
+from tourgen.stages.spacing import spacing_at
+from tourgen.tileset import tileset_json
+from tourgen.tour import Viewpoint
+
+_ROOT_TEXELS = 500_000
+_POSTER_QUALITY = 82
+
+
+@dataclass(frozen=True, slots=True)
+class Texels:
+    """Edge of a texel at the finest level, at the finest."""
+
+    texel_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Packing:
+    """Quality of the pictures, 1 to 100."""
+
+    quality: int
+
+
+@dataclass(frozen=True, slots=True)
+class Entering:
+    """The first view that the tour file gives, if any."""
+
+    position: Corner | None
+    look_at: Corner | None
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """One level of detail in figures."""
+
+    tiles: int
+    faces: int
+    bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """A room in figures, for the tour's pages and the report.
+
+    Attributes:
+        origin: (3,) float64, of all the room's coordinates.
+        bounds: (2, 3) float64, lowest and highest corner, metres from the origin.
+        facts: How reading went.
+        points_used: Points left after cleaning.
+        stations: (s, 3) float64, given or found, metres from the origin.
+        station_moved_mm: (s,) float64, how far registration moved each.
+        removed: Points dropped by cleaning, by cause.
+        levels: Coarsest first.
+    """
+
+    origin: Float64
+    bounds: Float64
+    facts: ReadFacts
+    points_used: int
+    stations: Float64
+    station_moved_mm: Float64
+    removed: Mapping[str, int]
+    levels: tuple[Level, ...]
+
+
+def entering(start: Viewpoint | None) -> Entering:
+    """The first view that the tour file gives."""
+    return Entering(start.position, start.look_at) if start else Entering(None, None)
+
+
+def unwrapped(room: tuple[Tile, ...], cloud: PointCloud, asked: Texels) -> tuple[UvMesh, ...]:
+    """Unwrap each tile.
+
+    A leaf's texels are half as wide as the scan's spacing there, down to the size asked for; a
+    branch's are twice those below it; the root's make a picture of a fixed size.
+    """
+    texel_m = _texels(room, cKDTree(cloud.points), asked.texel_mm / 1000)
+    return tuple(unwrap.unwrap(tile.mesh, unwrap.Settings(texel_m[tile.id])) for tile in room)
+
+
+def _texels(room: tuple[Tile, ...], tree: cKDTree, finest_m: float) -> dict[str, float]:
+    rng = np.random.default_rng(0)
+    texel_m: dict[str, float] = {}
+    for tile in reversed(room):  # children first
+        if tile.children:
+            texel_m[tile.id] = 2 * float(np.median([texel_m[child] for child in tile.children]))
+            continue
+        vertices = tile.mesh.vertices
+        sample = vertices[rng.choice(len(vertices), min(200, len(vertices)), replace=False)]
+        _, nearest = tree.query(sample)
+        spacing_m = spacing_at(tree, tree.data[nearest].astype(np.float32))
+        texel_m[tile.id] = max(finest_m, 0.5 * float(np.median(spacing_m)))
+    root = room[0]
+    if root.children:
+        texel_m[root.id] = float(np.sqrt(face_areas(root.mesh).sum() / _ROOT_TEXELS))
+    return texel_m
+
+
+def baked(
+    unwrapped_tiles: tuple[UvMesh, ...],
+    oriented: OrientedCloud,
+    cloud: PointCloud,
+    scan: RoomScan,
+    joined: register.Registered,
+    simplified: levels.Levels,
+    settings: bake.Settings,
+) -> tuple[TexturedMesh, ...]:
+    """Bake each tile's picture from the full cloud, and from panoramas where there are any."""
+    finest_m = min(each.texel_m for each in unwrapped_tiles)
+    index = bake.color_index(cloud, oriented, finest_m)
+    panoramas = moved(scan.panoramas, joined)
+    vistas = bake.vistas(panoramas, simplified.finest, index, bake.VistaSettings())
+    return tuple(bake.bake(each, index, settings, vistas) for each in unwrapped_tiles)
+
+
+def packed(
+    room: tuple[Tile, ...], textured: tuple[TexturedMesh, ...], asked: Packing
+) -> Mapping[str, bytes]:
+    """Pack all tiles on one quantisation grid, and write the tileset."""
+    vertices = np.concatenate([tile.mesh.vertices for tile in room])
+    settings = pack.Settings(grid=pack.grid(vertices), quality=asked.quality)
+    files = {
+        f"tiles/{tile.id}.glb": pack.pack(each, settings)
+        for tile, each in zip(room, textured, strict=True)
+    }
+    return {"tileset.json": tileset_json(room), **files}
+
+
+def entered(simplified: levels.Levels, joined: register.Registered, asked: Entering) -> View:
+    """The first view: as given, else found."""
+    if asked.position is None or asked.look_at is None:
+        return entry.entry_view(simplified.root, joined.stations, entry.Settings())
+    origin = simplified.root.origin
+    return View(np.array(asked.position) - origin, np.array(asked.look_at) - origin)
+
+
+def pictured(
+    room: tuple[Tile, ...],
+    textured: tuple[TexturedMesh, ...],
+    view: View,
+    settings: poster.Settings,
+) -> bytes:
+    """Render the first view from the finest level, as WebP."""
+    from PIL import Image
+
+    leaves = [each for tile, each in zip(room, textured, strict=True) if not tile.children]
+    stream = io.BytesIO()
+    picture = Image.fromarray(poster.poster(leaves, view, settings))
+    picture.save(stream, "WEBP", quality=_POSTER_QUALITY, method=6)
+    return stream.getvalue()
+
+
+def summarised(
+    scan: RoomScan,
+    cloud: PointCloud,
+    joined: register.Registered,
+    kept: sift.Sifted,
+    room: tuple[Tile, ...],
+    files: Mapping[str, bytes],
+) -> Summary:
+    """Gather the figures that pages and report show."""
+    vertices = np.concatenate([tile.mesh.vertices for tile in room]).astype(np.float64)
+    return Summary(
+        scan.cloud.origin,
+        np.stack([vertices.min(axis=0), vertices.max(axis=0)]),
+        scan.facts,
+        len(cloud),
+        joined.stations,
+        joined.moved_mm,
+        kept.removed,
+        tuple(_level(room, files, depth) for depth in range(_depth(room) + 1)),
+    )
+
+
+def _depth(room: tuple[Tile, ...]) -> int:
+    return max(len(tile.id) for tile in room) - 1
+
+
+def _level(room: tuple[Tile, ...], files: Mapping[str, bytes], depth: int) -> Level:
+    """The room at one level: its tiles of that depth, and the leaves above."""
+    shown = [
+        tile
+        for tile in room
+        if len(tile.id) == depth + 1 or (len(tile.id) <= depth and not tile.children)
+    ]
+    return Level(
+        len(shown),
+        sum(len(tile.mesh.faces) for tile in shown),
+        sum(len(files[f"tiles/{tile.id}.glb"]) for tile in shown),
+    )

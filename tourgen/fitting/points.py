@@ -1,0 +1,166 @@
+"""Fitting the points: from a room's scans to points that know where they belong and where to look.
+
+Each function runs one stage with settings that follow from the tour file and the scan.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tourgen.fitting.lengths import Corner, corners, detail_m
+from tourgen.geometry import Float64, OrientedCloud, Panorama, PointCloud
+from tourgen.scans import ReadFacts, read_panoramas, read_room
+from tourgen.stages import exposure, floor, normals, ownership, register, sift, stations, thin
+from tourgen.stages.spacing import Spacing
+from tourgen.tour import Room, open_scans
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """How scans become one cloud."""
+
+    unit: str
+    up: str
+    poses: tuple[Any, ...]
+    scan_stations: tuple[Any, ...]
+    stations: Any
+    keep: tuple[Corner, Corner] | None
+    remove: tuple[tuple[Corner, Corner], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Thinning:
+    """The voxel asked for; None is half the detail."""
+
+    detail_mm: float | None
+    thin_mm: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class RoomScan:
+    """What the scans hold.
+
+    Attributes:
+        cloud: The cropped points.
+        stations: (s, 3) float64, metres from the cloud's origin: as given, or as the scans tell.
+        panoramas: Pictures with poses.
+        facts: How reading went.
+    """
+
+    cloud: PointCloud
+    stations: Float64
+    panoramas: tuple[Panorama, ...]
+    facts: ReadFacts
+
+
+@dataclass(frozen=True, slots=True)
+class Stationed:
+    """A cloud and where it was measured from.
+
+    Attributes:
+        cloud: Whose ``station`` counts through the stations.
+        stations: (s, 3) float64, metres from the cloud's origin.
+    """
+
+    cloud: PointCloud
+    stations: Float64
+
+
+def reading(room: Room) -> Reading:
+    """What of a room's settings bears on reading."""
+    return Reading(
+        room.unit,
+        room.up,
+        tuple(scan.pose for scan in room.scans),
+        tuple(scan.station for scan in room.scans),
+        room.stations,
+        corners(room.keep) if room.keep else None,
+        tuple(corners(box) for box in room.remove),
+    )
+
+
+def read(room: Room, folder: Path, _: Reading) -> RoomScan:
+    """Read a room's scans; the settings are those of the room, gathered for the key."""
+    scans = open_scans(room, folder)
+    cloud, found, facts = read_room(scans, room.keep, room.remove, room.clean.min_points)
+    panoramas = read_panoramas(scans, cloud.origin)
+    if room.stations == "auto":
+        return RoomScan(cloud, found, panoramas, facts)
+    given = np.array(room.stations, np.float64) - cloud.origin
+    if len(found) != len(given):
+        cloud = replace(cloud, station=np.full_like(cloud.station, -1))
+    return RoomScan(cloud, given, panoramas, facts)
+
+
+def stations_of(scan: RoomScan, settings: stations.Settings) -> Float64:
+    """The stations as given, or as the scan tells, or as found."""
+    if len(scan.stations):
+        return scan.stations
+    return stations.find_stations(scan.cloud.points, settings)
+
+
+def owned(scan: RoomScan, places: Float64, settings: ownership.Settings) -> Stationed:
+    """Tell which station measured each point, where the scan has forgotten."""
+    if not len(places) or np.all(scan.cloud.station >= 0):
+        return Stationed(scan.cloud, places)
+    found = ownership.ownership(scan.cloud.points, places, settings)
+    return Stationed(replace(scan.cloud, station=found.station), found.stations)
+
+
+def registered(scan: Stationed, settings: register.Settings) -> register.Registered:
+    """Bring the stations together."""
+    return register.register(scan.cloud, scan.stations, settings)
+
+
+def sifted(joined: register.Registered, settings: sift.Settings) -> sift.Sifted:
+    """Drop what is not there."""
+    return sift.sift(joined.cloud, joined.stations, settings)
+
+
+def exposed(
+    kept: sift.Sifted, joined: register.Registered, settings: exposure.Settings
+) -> PointCloud:
+    """Bring the stations' colours into agreement."""
+    return exposure.exposure(kept.cloud, joined.stations, settings)
+
+
+def moved(panoramas: tuple[Panorama, ...], joined: register.Registered) -> tuple[Panorama, ...]:
+    """The panoramas moved along with the stations that they were taken from."""
+    if not len(joined.stations):
+        return panoramas
+    before = np.einsum("sji,sj->si", joined.rotations, joined.stations - joined.translations)
+    out = []
+    for each in panoramas:
+        nearest = int(np.linalg.norm(before - each.position, axis=1).argmin())
+        turn, shift = joined.rotations[nearest], joined.translations[nearest]
+        out.append(
+            replace(each, position=turn @ each.position + shift, rotation=turn @ each.rotation)
+        )
+    return tuple(out)
+
+
+def thinned(cloud: PointCloud, spacing: Spacing, asked: Thinning) -> PointCloud:
+    """Thin to half the detail, so that each cell of the octree keeps several points.
+
+    A scan denser than the detail is thinned further, toward a point a cell: each is the mean of
+    so many that more would only cost.
+    """
+    detail = detail_m(spacing, asked.detail_mm)
+    voxel_m = max(detail / 2, detail - spacing.median_m / 2)
+    return thin.thin(cloud, thin.Settings(asked.thin_mm / 1000 if asked.thin_mm else voxel_m))
+
+
+def oriented(
+    cloud: PointCloud, joined: register.Registered, settings: normals.Settings
+) -> OrientedCloud:
+    """Estimate normals, turned toward the free space."""
+    return normals.normals(cloud, joined.stations, settings)
+
+
+def floored(oriented: OrientedCloud, spacing: Spacing) -> OrientedCloud:
+    """Lay the floor under the tripods as densely as the scan is."""
+    return floor.floor(oriented, floor.Settings(spacing.median_m))
