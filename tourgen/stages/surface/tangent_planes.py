@@ -126,7 +126,8 @@ def _parts(near: Int32) -> Iterator[tuple[slice, Int32]]:
 
 def _closeness(points: Float32, part: slice, around: Int32) -> Float32:
     """(n, k) weight of each neighbour by its distance, up to 1."""
-    away = np.square(points[around] - points[part, None]).sum(axis=2)
+    offset = points[around] - points[part, None]
+    away = np.einsum("ikj,ikj->ik", offset, offset)
     width = np.float32(_WIDTH**2) * away.max(axis=1, keepdims=True)
     return np.asarray(np.exp(-away / width), np.float32)
 
