@@ -33,7 +33,8 @@ from tourgen.geometry import Float64, PointCloud
 from tourgen.scans import open_scan, read_room
 from tourgen.simulate import VERSION
 from tourgen.simulation.light import ray_scene
-from tourgen.stages import clean, sift, stations
+from tourgen.stages import clean, owners, sift, stations
+from tourgen.tour import load_tour
 
 SURFACE, MIXED, STRAY, GHOST, PASSER_BY = range(5)
 NEAR_M = 0.010
@@ -72,6 +73,9 @@ def modelled(tour: Path, room: str, suffix: str) -> Case:
     if suffix == "e57":  # each station's points in the order of its grid, which the PLY shuffles
         order = np.random.default_rng([VERSION, *room.encode(), 2]).permutation(len(label))
         label = label[np.argsort(order)]
+    else:
+        given = {each.id: each.stations for each in load_tour(tour).rooms}[room]
+        known = known if given == "auto" else np.array(given, np.float64) - cloud.origin
     truth = Truth(tour / "truth", room)
     points, face = spread(truth.vertices, truth.faces, np.random.default_rng(1))
     wanted = points[truth.seen(points, face)]
@@ -119,7 +123,8 @@ def cleaned(case: Case) -> tuple[PointCloud, Float64]:
     if not len(known):
         rough = clean.clean(case.cloud, clean.Settings())
         known = stations.find_stations(rough.points, stations.Settings())
-    return sift.sift(case.cloud, known, sift.Settings()).cloud, known
+    owned = owners.owners(case.cloud, known, owners.Settings())
+    return sift.sift(owned.cloud, owned.stations, sift.Settings()).cloud, owned.stations
 
 
 def figures(case: Case, kept: PointCloud) -> dict[str, float]:

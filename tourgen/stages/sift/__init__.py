@@ -2,6 +2,7 @@
 
 In this order, since each step trusts what the ones before left:
 
+- *reflected*: what lies behind a mirror (``mirrors.py``).
 - *passed*: what another station looked through (``through.py``), a passer-by above all.
 - *mixed*: returns of beams that struck two surfaces at once (``mixed.py``).
 - *strays*: points and clusters apart from all else (``strays.py``).
@@ -21,12 +22,14 @@ import numpy.typing as npt
 
 from tourgen.errors import InputError
 from tourgen.geometry import Float64, PointCloud
+from tourgen.stages.sift.mirrors import reflections
 from tourgen.stages.sift.mixed import mixed
-from tourgen.stages.sift.strays import islands, isolated
+from tourgen.stages.sift.strays import clusters, islands, isolated
 from tourgen.stages.sift.through import confirmed, grown, passed
-from tourgen.stages.sift.views import owners_known, views
+from tourgen.stages.sift.views import views
 
 VERSION = 1
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +39,7 @@ class Settings:
     Attributes:
         min_points: Fewest points that make a room.
         margin_m: How far behind a place a beam must end to have passed it.
+        behind_m: What lies farther behind a mirror, on a beam through it, is a reflection.
         mixed_m: A mixed pixel this near to a surface may stay.
         confirm_m: A point that another station measured within this stays.
         neighbours: Points that make a neighbourhood in space.
@@ -47,6 +51,7 @@ class Settings:
 
     min_points: int = 10_000
     margin_m: float = 0.02
+    behind_m: float = 0.003
     mixed_m: float = 0.006
     confirm_m: float = 0.006
     neighbours: int = 8
@@ -81,33 +86,33 @@ def sift(cloud: PointCloud, stations: Float64, settings: Settings) -> Sifted:
         InputError: Fewer than ``min_points`` points, before or after.
     """
     _require(len(cloud), settings.min_points, "")
-    gone = {
-        "passed": _passed(cloud, stations, settings),
-    }
-    rest = ~gone["passed"]
-    gone["mixed"] = _within(rest, _mixed(cloud.take(rest), stations, settings))
-    rest &= ~gone["mixed"]
-    gone["strays"] = _within(rest, _strays(cloud.take(rest), settings))
-    rest &= ~gone["strays"]
+    steps = {"reflected": _reflected, "passed": _passed, "mixed": _mixed, "strays": _strays}
+    rest = np.ones(len(cloud), np.bool_)
+    removed = {}
+    for cause, step in steps.items():
+        gone = step(cloud.take(rest), stations, settings)
+        rest[np.flatnonzero(rest)[gone]] = False
+        removed[cause] = int(gone.sum())
     kept = cloud.take(rest)
     _require(len(kept), settings.min_points, " after cleaning")
-    return Sifted(kept, {cause: int(mask.sum()) for cause, mask in gone.items()})
+    return Sifted(kept, removed)
 
 
-Mask = npt.NDArray[np.bool_]
-
-
-def _within(rest: Mask, chosen: Mask) -> Mask:
-    """A mask of the points of ``rest`` as one of all points."""
-    out = np.zeros(len(rest), np.bool_)
-    out[rest] = chosen
-    return out
+def _reflected(cloud: PointCloud, stations: Float64, settings: Settings) -> Mask:
+    if not len(stations):
+        return np.zeros(len(cloud), np.bool_)
+    cluster = clusters(cloud.points, settings.island_gap_m)
+    return reflections(cloud.points, cluster, list(views(cloud, stations)), settings.behind_m)
 
 
 def _passed(cloud: PointCloud, stations: Float64, settings: Settings) -> Mask:
-    if not owners_known(cloud, stations):
-        return np.zeros(len(cloud), np.bool_)
-    return grown(cloud, passed(cloud, list(views(cloud, stations)), settings.margin_m))
+    known = cloud.station >= 0
+    gone = np.zeros(len(cloud), np.bool_)
+    if len(stations) > 1 and known.any():
+        told = cloud.take(known)
+        gone[known] = passed(told, list(views(told, stations)), settings.margin_m)
+        gone = grown(cloud, gone)
+    return gone
 
 
 def _mixed(cloud: PointCloud, stations: Float64, settings: Settings) -> Mask:
@@ -118,10 +123,12 @@ def _mixed(cloud: PointCloud, stations: Float64, settings: Settings) -> Mask:
     return found
 
 
-def _strays(cloud: PointCloud, settings: Settings) -> Mask:
+def _strays(cloud: PointCloud, _: Float64, settings: Settings) -> Mask:
     gone = islands(cloud.points, settings.island_gap_m, settings.island_share)
-    alone = isolated(cloud.points[~gone], settings.neighbours, settings.isolation_ratio)
-    return gone | _within(~gone, alone)
+    rest = np.flatnonzero(~gone)
+    alone = isolated(cloud.points[rest], settings.neighbours, settings.isolation_ratio)
+    gone[rest[alone]] = True
+    return gone
 
 
 def _require(found: int, needed: int, when: str) -> None:

@@ -18,6 +18,7 @@ from tourgen.geometry import Float32
 from tourgen.stages.sift.views import View
 
 Mask = npt.NDArray[np.bool_]
+Floats = npt.NDArray[np.floating]
 Places = tuple[Float32, Float32, Float32]
 _RING = 8
 _NEAR = 20
@@ -26,6 +27,8 @@ _COMPANY = 8
 each."""
 _STEEP = 8.0
 _STEEP_COMPANY = 13
+_ROW = 3
+"""Fewest points on one line, on both sides of a point."""
 _SUSPECT_SIGMA = 2.5
 _PLANE_SIGMA = 1.5
 _OWN_SIGMA = 2.5
@@ -95,7 +98,7 @@ def _in_company(view: View, at: npt.NDArray[np.int64], noise_m: Float32, near_m:
     reach = radius / np.maximum(radius[:, :_RING].mean(axis=1, keepdims=True), 1e-9)
     error = noise_m / (own * own)
     tolerance = _PLANE_SIGMA * error[:, None] * (1 + reach)
-    company = np.zeros(len(at), np.bool_)
+    company = _on_line(places, own, tolerance)
     for corners in _triples(places):
         level, slope_u, slope_v, wide = _plane(*corners)
         off = np.abs(inverse - level[:, None] - slope_u[:, None] * u - slope_v[:, None] * v)
@@ -110,6 +113,24 @@ def _in_company(view: View, at: npt.NDArray[np.int64], noise_m: Float32, near_m:
             spread *= _OWN_SIGMA * error[check]
             company[check] = (off < spread) | (off_m < near_m)
     return company
+
+
+def _on_line(places: Places, own: Float32, tolerance: Float32) -> Mask:
+    """Whether a point lies on a straight row of others that goes on to both sides, as on a rod
+    one beam wide."""
+    u, v, inverse = places
+    apart = 0.35 * np.hypot(u[:, :_RING], v[:, :_RING]).mean(axis=1, keepdims=True)
+    found = np.zeros(len(u), np.bool_)
+    for number in range(_RING):
+        length = np.maximum(np.hypot(u[:, number], v[:, number]), 1e-9)[:, None]
+        right, up = u[:, number, None] / length, v[:, number, None] / length
+        along = u * right + v * up
+        slope = inverse[:, number, None] / length
+        row = (np.abs(u * up - v * right) < apart) & (np.abs(along) > apart)
+        row &= np.abs(inverse - slope * along) < tolerance
+        both = (row & (along < 0)).any(axis=1) & (row.sum(axis=1) >= _ROW)
+        found |= both & (np.abs(slope[:, 0]) * own < _STEEP)
+    return found
 
 
 def _triples(places: Places) -> Iterator[tuple[Float32, Float32, Float32]]:
@@ -134,7 +155,7 @@ def _triples(places: Places) -> Iterator[tuple[Float32, Float32, Float32]]:
         )
 
 
-def _plane(a: Float32, b: Float32, c: Float32) -> tuple[Float32, Float32, Float32, Mask]:
+def _plane(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Floats, Mask]:
     """Level and slopes of the planes through three points each, and whether these span one."""
     b, c = b - a, c - a
     area = b[:, 0] * c[:, 1] - c[:, 0] * b[:, 1]

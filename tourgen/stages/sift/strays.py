@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from tourgen.geometry import Float32
+from tourgen.geometry import Float32, Int32
 from tourgen.stages.mesh_arrays import components
 
 Mask = npt.NDArray[np.bool_]
@@ -47,13 +47,21 @@ def isolated(points: Float32, neighbours: int, ratio: float) -> Mask:
     return found
 
 
-def islands(points: Float32, gap_m: float, share: float) -> Mask:
-    """Mask of the (n, 3) points in clusters of less than ``share`` of all, ``gap_m`` apart."""
+def clusters(points: Float32, gap_m: float) -> Int32:
+    """(n,) number of the cluster that each point lies in, ``gap_m`` apart, the largest first."""
     cells, inverse, counts = _occupied(points, gap_m)
     pairs = cKDTree(cells).query_pairs(1.8, output_type="ndarray")
     cluster = components(pairs, len(cells))
     size = np.bincount(cluster, weights=counts)
-    return np.asarray((size < share * len(points))[cluster][inverse])
+    rank = np.empty(len(size), np.int32)
+    rank[np.argsort(-size, kind="stable")] = np.arange(len(size))
+    return np.asarray(rank[cluster][inverse])
+
+
+def islands(points: Float32, gap_m: float, share: float) -> Mask:
+    """Mask of the (n, 3) points in clusters of less than ``share`` of all, ``gap_m`` apart."""
+    cluster = clusters(points, gap_m)
+    return np.asarray((np.bincount(cluster) < share * len(points))[cluster])
 
 
 def _occupied(

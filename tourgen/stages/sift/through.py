@@ -2,8 +2,9 @@
 
 Whoever walks past stands in one station's view only, and the others measured what lies behind.
 A place is looked through where every beam of a station near its direction (3 by 3 cells, each
-little wider than the angle between beams) went farther by a margin. Thin objects stop one of
-these beams at least, slanted surfaces some of them earlier, and so they stay.
+little wider than the angle between beams) went farther by a margin. Slanted surfaces stop some of
+these beams earlier, and so they stay. So do rods, even such as fit between two beams: what was
+looked through must be wider than that, or a point without company.
 
 Where another station could not see that part of a person (a foot against the floor, a leg behind
 the table), it goes with the rest: points in the midst of such ones go too, unless a second
@@ -16,7 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import minimum_filter, uniform_filter
+from scipy.ndimage import binary_opening, minimum_filter, uniform_filter
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, PointCloud
@@ -31,21 +32,44 @@ _ROUNDS = 4
 _GROW_M = 0.05
 _GROW_NEIGHBOURS = 10
 _SAME_PLACE_M = 0.015
+_LINE_POINTS = 3
+_LINE_SPACINGS = 2.5
 
 
 def passed(cloud: PointCloud, seen: Sequence[View], margin_m: float) -> Mask:
     """Mask of the points that a station other than their own looked through."""
-    through = np.zeros(len(cloud), np.bool_)
+    wide, narrow = np.zeros(len(cloud), np.bool_), np.zeros(len(cloud), np.bool_)
     for number, view in enumerate(seen):
         if len(view) <= _LEAST_BEAMS:
             continue
         nearest, beams = _reach(view, cloud.points[view.index])
         for other, theirs in enumerate(seen):
-            if other != number:
-                cell, distance, _ = nearest.cells(cloud.points[theirs.index])
-                far = distance + margin_m < nearest.range_m.reshape(-1)[cell]
-                through[theirs.index] |= far & (beams.reshape(-1)[cell] >= _LEAST_BEAMS)
-    return through
+            if other == number:
+                continue
+            cell, distance, _ = nearest.cells(cloud.points[theirs.index])
+            through = distance + margin_m < nearest.range_m.reshape(-1)[cell]
+            through &= beams.reshape(-1)[cell] >= _LEAST_BEAMS
+            at, cell = theirs.index[through], cell[through]
+            filled = np.zeros(nearest.range_m.shape, np.bool_)
+            filled.reshape(-1)[cell] = True
+            broad = binary_opening(filled, np.ones((3, 3), np.bool_)).reshape(-1)[cell]
+            wide[at[broad]] = True
+            narrow[at[~broad]] = True
+    narrow &= ~wide
+    for view in seen:
+        thin = np.flatnonzero(narrow[view.index])
+        narrow[view.index[thin[_in_line(view, thin, cloud.points)]]] = False
+    return wide | narrow
+
+
+def _in_line(view: View, at: npt.NDArray[np.int64], points: Float32) -> Mask:
+    """Which of the points ``at`` of a view have several others of them close by, as a rod has."""
+    if len(at) <= _LINE_POINTS:
+        return np.zeros(len(at), np.bool_)
+    own = points[view.index[at]]
+    distance = np.asarray(cKDTree(own).query(own, k=[_LINE_POINTS + 1])[0])
+    spacing_m = _step(view) * view.range_m[at]
+    return np.asarray(np.asarray(distance)[:, 0] < _LINE_SPACINGS * spacing_m)
 
 
 def _reach(view: View, points: Float32) -> tuple[DepthBuffer, Float32]:

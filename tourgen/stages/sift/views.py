@@ -52,24 +52,18 @@ class View:
             yield at[start : start + _BLOCK]
 
 
-def owners_known(cloud: PointCloud, stations: Float64) -> bool:
-    """Whether every point tells which of the stations measured it."""
-    own = cloud.station
-    return bool(len(stations) and len(own) and own.min() >= 0 and own.max() < len(stations))
-
-
 def views(cloud: PointCloud, stations: Float64) -> Iterator[View]:
     """The view of each station that has one.
 
-    Where the cloud tells which station measured a point, that point is in its view alone.
-    Elsewhere it is in the view of every station that has nothing in front of it.
+    A point that tells which station measured it is in the view of that one alone, another one in
+    the view of every station that has nothing in front of it.
     """
-    known = owners_known(cloud, stations)
+    unknown = np.flatnonzero((cloud.station < 0) | (cloud.station >= len(stations)))
     for number, station in enumerate(stations):
-        if known:
-            index = np.flatnonzero(cloud.station == number)
-        else:
-            index = np.flatnonzero(_in_sight(cloud.points, station))
+        index = np.flatnonzero(cloud.station == number)
+        if len(unknown):
+            seen = unknown[_in_sight(cloud.points, station)[unknown]]
+            index = np.sort(np.concatenate([index, seen]))
         way = cloud.points[index] - station.astype(np.float32)
         range_m = np.sqrt(np.einsum("ij,ij->i", way, way))
         away = range_m > 1e-3  # what lies in the scanner itself has no direction

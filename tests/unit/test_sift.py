@@ -1,0 +1,171 @@
+"""Sifting: what is not there goes, what is thin, slanted or seen through a window stays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scanned import EYES, ROOM, beams, cloud_of, inside, noisy, ranges, solid
+
+from tourgen.errors import InputError
+from tourgen.geometry import PointCloud
+from tourgen.stages import sift
+
+SETTINGS = sift.Settings(min_points=100)
+PERSON = solid([0.0, -1.2, 0.0], [0.4, -0.8, 1.75])
+ROD = solid([0.3, 0.3, 0.0], [0.32, 0.32, 2.6])
+TABLE = solid([-0.4, 0.9, 0.6], [0.6, 1.5, 0.75])
+WALLS = inside(*ROOM)
+
+
+def kept(cloud: PointCloud, sifted: sift.Sifted) -> np.ndarray:
+    """Mask of the points left."""
+    left = {row.tobytes() for row in sifted.cloud.points}
+    return np.array([row.tobytes() in left for row in cloud.points])
+
+
+def scans(*things: object, passer_by: bool = False, step_deg: float = 1.0) -> tuple:
+    """Points of each station, and whether each is of the passer-by, whom the first one sees."""
+    rng, way = np.random.default_rng(0), beams(step_deg)
+    parts, person = [], []
+    for number, eye in enumerate(EYES):
+        true = ranges(eye, way, WALLS, *things)
+        seen = ranges(eye, way, WALLS, *things, PERSON) if passer_by and number == 0 else true
+        parts.append((eye + way * noisy(seen, rng)[..., None]).reshape(-1, 3))
+        person.append((seen < true).reshape(-1))
+    return parts, np.concatenate(person)
+
+
+def test_who_stood_in_one_view_only_goes() -> None:
+    parts, person = scans(TABLE, passer_by=True)
+    cloud = cloud_of(parts)
+    left = kept(cloud, sift.sift(cloud, EYES, SETTINGS))
+    assert person.sum() > 300
+    assert left[person].mean() < 0.01
+    assert left[~person].mean() > 0.995
+
+
+def test_a_thin_rod_stays() -> None:
+    parts, _ = scans(ROD)
+    cloud = cloud_of(parts)
+    rod = (np.abs(cloud.points[:, :2] - 0.31) < 0.02).all(axis=1)
+    assert rod.sum() > 100
+    assert kept(cloud, sift.sift(cloud, EYES, SETTINGS))[rod].mean() > 0.9
+
+
+def test_mixed_pixels_go_and_edges_stay() -> None:
+    rng, way = np.random.default_rng(1), beams(0.8)
+    parts, off_m = [], []
+    for eye in EYES:
+        true = ranges(eye, way, WALLS, TABLE)
+        beside = np.roll(true, -1, axis=1)
+        mixed = (np.abs(true - beside) > 0.15) & (rng.random(true.shape) < 1 / 3)
+        share = rng.uniform(0.1, 0.9, true.shape)
+        seen = np.where(mixed, share * true + (1 - share) * beside, true)
+        off_m.append(np.minimum(np.abs(seen - true), np.abs(seen - beside)).reshape(-1))
+        parts.append((eye + way * noisy(seen, rng)[..., None]).reshape(-1, 3))
+    cloud, off = cloud_of(parts), np.concatenate(off_m)
+    sifted = sift.sift(cloud, EYES, SETTINGS)
+    left = kept(cloud, sifted)
+    assert (off > 0.02).sum() > 50
+    assert left[off > 0.02].mean() < 0.2
+    assert left[off == 0].mean() > 0.997
+    assert sifted.removed["mixed"] > 30
+
+
+@pytest.mark.parametrize("glass", ["mirror", "window"])
+def test_a_mirrored_room_goes_and_one_behind_a_window_stays(glass: str) -> None:
+    rng, way = np.random.default_rng(2), beams(0.8)
+    low, high = ROOM
+    chest, shelf = (
+        solid([-1.0, -0.2, 0.0], [-0.2, 0.3, 0.9]),
+        solid([0.6, -1.9, 0.9], [1.6, -1.5, 1.6]),
+    )
+    parts, behind = [], []
+    for eye in EYES:
+        reach = ranges(eye, way, WALLS, chest, shelf)
+        hit = eye + way * reach[..., None]
+        through = (hit[..., 1] > high[1] - 1e-6) & (np.abs(hit[..., 0]) < 0.6)
+        through &= np.abs(hit[..., 2] - 1.5) < 0.5
+        start, further = hit[through], way[through]
+        if glass == "mirror":
+            thrown = further * [1, -1, 1]
+            more = np.min(
+                [cast_each(start + thrown * 1e-6, thrown, low, high)]
+                + [box_each(start, thrown, *box) for box in BOXES],
+                axis=0,
+            )
+        else:
+            more = cast_each(
+                start, further, [low[0] - 1, high[1] - 1e-3, -1], high + np.array([1, 3, 1])
+            )
+        reach[through] += more
+        parts.append((eye + way * noisy(reach, rng)[..., None]).reshape(-1, 3))
+        behind.append(through.reshape(-1))
+    cloud, seen_behind = cloud_of(parts), np.concatenate(behind)
+    sifted = sift.sift(cloud, EYES, SETTINGS)
+    left = kept(cloud, sifted)
+    assert seen_behind.sum() > 500
+    assert left[~seen_behind].mean() > 0.995
+    if glass == "mirror":
+        assert left[seen_behind].mean() < 0.01
+        assert sifted.removed["reflected"] > 0.9 * seen_behind.sum()
+    else:
+        assert sifted.removed["reflected"] == 0
+
+
+BOXES = (([-1.0, -0.2, 0.0], [-0.2, 0.3, 0.9]), ([0.6, -1.9, 0.9], [1.6, -1.5, 1.6]))
+
+
+def cast_each(start: np.ndarray, way: np.ndarray, low: object, high: object) -> np.ndarray:
+    """Range to the walls around, each beam from a place of its own."""
+    with np.errstate(divide="ignore"):
+        return np.where(way > 0, (high - start) / way, (low - start) / way).min(axis=1)
+
+
+def box_each(start: np.ndarray, way: np.ndarray, low: list, high: list) -> np.ndarray:
+    """Range to a box, each beam from a place of its own."""
+    with np.errstate(divide="ignore"):
+        a, b = (low - start) / way, (high - start) / way
+    near, far = np.minimum(a, b).max(axis=1), np.maximum(a, b).min(axis=1)
+    return np.where((near < far) & (near > 0), near, np.inf)
+
+
+def test_strays_go_without_stations() -> None:
+    parts, _ = scans()
+    strays = np.random.default_rng(3).uniform([-2, -1.5, 0.5], [2, 1.5, 2.1], (60, 3))
+    cloud = cloud_of([*parts, strays, np.full((30, 3), 9.0)], merged=True)
+    left = kept(cloud, sift.sift(cloud, np.empty((0, 3)), SETTINGS))
+    assert left[-90:].mean() < 0.05
+    assert left[:-90].mean() > 0.99
+
+
+@pytest.mark.parametrize(
+    "stations",
+    [np.empty((0, 3)), EYES[:1], EYES, EYES + 500.0],
+    ids=["none", "one", "two", "far outside"],
+)
+@pytest.mark.parametrize("spread", [(1, 1, 0), (1, 0, 0), (0, 0, 0)], ids=["plane", "line", "spot"])
+@pytest.mark.parametrize("number", [-1, 0])
+def test_flat_clouds_pass(stations: np.ndarray, spread: tuple, number: int) -> None:
+    points = np.random.default_rng(0).random((2000, 3)) * spread
+    cloud = cloud_of([points])
+    cloud = PointCloud(
+        cloud.origin, cloud.points, cloud.colors, np.full_like(cloud.station, number)
+    )
+    assert len(sift.sift(cloud, stations, SETTINGS).cloud) > 1800
+
+
+def test_a_thousand_duplicates_do_no_harm() -> None:
+    parts, person = scans(passer_by=True)
+    again = [np.concatenate([parts[0], np.repeat(parts[0][5000:5001], 1000, axis=0)]), parts[1]]
+    cloud = cloud_of(again)
+    left = kept(cloud, sift.sift(cloud, EYES, SETTINGS))
+    wrong = np.concatenate([person[: len(parts[0])], np.zeros(1000, bool), person[len(parts[0]) :]])
+    assert left[wrong].mean() < 0.01
+    assert left[~wrong].mean() > 0.99
+
+
+def test_too_few_points_are_told() -> None:
+    cloud = cloud_of([np.random.default_rng(0).random((50, 3))])
+    with pytest.raises(InputError, match="expected at least 10000 points, found 50"):
+        sift.sift(cloud, EYES, sift.Settings())
