@@ -26,9 +26,16 @@ normals 6.8° off, and 86 % of what is seen has it within 2 mm, 99.0 % within 10
   grow: 15 mm.
 - A narrower crease (25° to 12°) and less wanted support (0.3 to 0.1): 1.9 mm, 0.76 mm in the
   median, normals 1.3° off; 92 % within 2 mm and 99.0 % within 10 mm.
+- Cells as wide as the spacing, 12.3 mm: 2.1 instead of 2.0 mm, 97.1 instead of 97.5 % within
+  5 mm, in three fifths of the time and with two fifths of the faces.
 - Not worth their cost: cells of 6 mm (2.04 instead of 2.12 mm, 1.8 times the faces), 24 neighbours
-  (smoother, 1.0°, but 98.5 instead of 98.7 % within 10 mm), a longer reach (the 99th percentile 6.3
-  instead of 4.9 mm, 99.1 % within 10 mm).
+  (smoother, 1.0°, but 98.5 instead of 98.7 % within 10 mm), a longer reach (the 99th percentile 7.0
+  instead of 4.8 mm, still 99.1 % within 10 mm).
+
+The whole chamber, 1.07 million points after sifting and registration, cells of 8.2 mm: 0.50 mm in
+the median, 1.9 mm at the 95th percentile, normals 1.2° off, 98.7 % within 10 mm (of the rest nine
+tenths have no point within 10 mm), F-score at 5 mm 0.978; 53 s of the processor and 0.9 GB. Half
+of a cloud's time goes to its tangent planes, a third to the distances.
 """
 
 from __future__ import annotations
@@ -67,7 +74,8 @@ class Settings:
     """The grid and the surface.
 
     Attributes:
-        cell_m: Edge of the grid's cells, 0.5 mm to 1 m; two thirds of the spacing is enough.
+        cell_m: Edge of the grid's cells, 0.5 mm to 1 m; as wide as the spacing does, two
+            thirds of it draw edges a little sharper.
         spacing_m: Distance between neighbouring points in the middle of the room, 0.1 mm to 1 m.
         noise_m: Standard deviation of the range, 0 to 0.1 m.
         neighbours: Points that speak for a tangent plane, 4 to 64.
