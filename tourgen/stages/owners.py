@@ -56,7 +56,7 @@ class Settings:
         share: Least share of all points that must lie on a grid; else nothing is claimed.
     """
 
-    search_m: float = 0.12
+    search_m: float = 0.2
     search_height_m: float = 0.3
     evidence: float = 8.0
     tolerance: float = 0.1

@@ -30,7 +30,7 @@ _STEEP_COMPANY = 13
 _ROW = 3
 """Fewest points on one line, on both sides of a point."""
 _SUSPECT_SIGMA = 2.5
-_PLANE_SIGMA = 1.5
+_PLANE_SIGMA = 1.2
 _OWN_SIGMA = 2.5
 _BETWEEN_SIGMA = 3.0
 _SAMPLE = 50_000

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_opening, minimum_filter, uniform_filter
+from scipy.ndimage import binary_dilation, binary_opening, minimum_filter, uniform_filter
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, PointCloud
@@ -32,6 +32,7 @@ _ROUNDS = 4
 _GROW_M = 0.05
 _GROW_NEIGHBOURS = 10
 _SAME_PLACE_M = 0.015
+_SQUARE = np.ones((3, 3), np.bool_)
 _LINE_POINTS = 3
 _LINE_SPACINGS = 2.5
 
@@ -52,7 +53,8 @@ def passed(cloud: PointCloud, seen: Sequence[View], margin_m: float) -> Mask:
             at, cell = theirs.index[through], cell[through]
             filled = np.zeros(nearest.range_m.shape, np.bool_)
             filled.reshape(-1)[cell] = True
-            broad = binary_opening(filled, np.ones((3, 3), np.bool_)).reshape(-1)[cell]
+            core = binary_opening(filled, _SQUARE)
+            broad = binary_dilation(core, _SQUARE, iterations=2).reshape(-1)[cell]
             wide[at[broad]] = True
             narrow[at[~broad]] = True
     narrow &= ~wide
