@@ -21,6 +21,8 @@ from scipy.ndimage import binary_dilation, binary_opening, minimum_filter, unifo
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, PointCloud
+from tourgen.stages.mesh_arrays import components
+from tourgen.stages.sift.strays import clusters
 from tourgen.stages.sift.views import View
 from tourgen.stages.sight import DepthBuffer, depth_buffer
 
@@ -32,6 +34,8 @@ _ROUNDS = 4
 _GROW_M = 0.05
 _GROW_NEIGHBOURS = 10
 _SAME_PLACE_M = 0.015
+_ENCLAVE_M = 0.2
+_BODY_POINTS = 200
 _SQUARE = np.ones((3, 3), np.bool_)
 _LINE_POINTS = 3
 _LINE_SPACINGS = 2.5
@@ -108,7 +112,37 @@ def grown(cloud: PointCloud, gone: Mask) -> Mask:
         if not len(edge):
             break
         gone[edge] = True
+    gone[_enclaves(cloud, gone)] = True
     return gone
+
+
+def _enclaves(cloud: PointCloud, gone: Mask) -> npt.NDArray[np.int64]:
+    """Small pieces that only one station measured, next to a body that is gone, and nowhere far
+    from it: a shoe that all others have in shadow."""
+    body = cloud.points[gone]
+    if len(body):
+        number = clusters(body, _GROW_M)
+        body = body[(np.bincount(number) >= _BODY_POINTS)[number]]
+    if not len(body):
+        return np.empty(0, np.int64)
+    rest = np.flatnonzero(~gone)
+    distance, _ = cKDTree(body).query(
+        cloud.points[rest], distance_upper_bound=_ENCLAVE_M + _GROW_M, workers=-1
+    )
+    near = np.isfinite(distance)
+    rest, distance = rest[near], distance[near]
+    alone = ~confirmed(cloud, rest, ~gone, _SAME_PLACE_M)
+    rest, distance = rest[alone], distance[alone]
+    if len(rest) < 2:
+        return np.empty(0, np.int64)
+    tree = cKDTree(cloud.points[rest])
+    distance_m = np.asarray(tree.query(cloud.points[rest], k=[2])[0])
+    pairs = tree.query_pairs(2 * float(np.median(distance_m)), output_type="ndarray")
+    piece = components(pairs, len(rest))
+    farthest, nearest = np.zeros(len(rest)), np.full(len(rest), np.inf)
+    np.maximum.at(farthest, piece, distance)
+    np.minimum.at(nearest, piece, distance)
+    return rest[((farthest < _ENCLAVE_M) & (nearest < _GROW_M))[piece]]
 
 
 def _amid(cloud: PointCloud, edge: npt.NDArray[np.int64], gone: Mask) -> Mask:
