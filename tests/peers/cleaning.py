@@ -19,7 +19,7 @@ import argparse
 import json
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,7 @@ from tourgen.geometry import Float64, PointCloud
 from tourgen.scans import open_scan, read_room
 from tourgen.simulate import VERSION
 from tourgen.simulation.light import ray_scene
-from tourgen.stages import clean, owners, sift, stations
+from tourgen.stages import ownership, sift, stations
 from tourgen.tour import load_tour
 
 SURFACE, MIXED, STRAY, GHOST, PASSER_BY = range(5)
@@ -121,10 +121,12 @@ def cleaned(case: Case) -> tuple[PointCloud, Float64]:
     """What a build keeps, and the stations it goes by."""
     known = case.stations
     if not len(known):
-        rough = clean.clean(case.cloud, clean.Settings())
-        known = stations.find_stations(rough.points, stations.Settings())
-    owned = owners.owners(case.cloud, known, owners.Settings())
-    return sift.sift(owned.cloud, owned.stations, sift.Settings()).cloud, owned.stations
+        known = stations.find_stations(case.cloud.points, stations.Settings())
+    cloud = case.cloud
+    if (cloud.station < 0).any():
+        owned = ownership.ownership(cloud.points, known, ownership.Settings())
+        known, cloud = owned.stations, replace(cloud, station=owned.station)
+    return sift.sift(cloud, known, sift.Settings()).cloud, known
 
 
 def figures(case: Case, kept: PointCloud) -> dict[str, float]:

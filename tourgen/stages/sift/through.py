@@ -36,6 +36,7 @@ _GROW_NEIGHBOURS = 10
 _SAME_PLACE_M = 0.015
 _ENCLAVE_M = 0.2
 _BODY_POINTS = 200
+_LINK_SPACINGS = 1.7
 _SQUARE = np.ones((3, 3), np.bool_)
 _LINE_POINTS = 3
 _LINE_SPACINGS = 2.5
@@ -130,14 +131,14 @@ def _enclaves(cloud: PointCloud, gone: Mask) -> npt.NDArray[np.int64]:
         cloud.points[rest], distance_upper_bound=_ENCLAVE_M + _GROW_M, workers=-1
     )
     near = np.isfinite(distance)
-    rest, distance = rest[near], distance[near]
+    rest, distance = rest[near], np.asarray(distance)[near]
     alone = ~confirmed(cloud, rest, ~gone, _SAME_PLACE_M)
     rest, distance = rest[alone], distance[alone]
     if len(rest) < 2:
         return np.empty(0, np.int64)
     tree = cKDTree(cloud.points[rest])
     distance_m = np.asarray(tree.query(cloud.points[rest], k=[2])[0])
-    pairs = tree.query_pairs(2 * float(np.median(distance_m)), output_type="ndarray")
+    pairs = tree.query_pairs(_LINK_SPACINGS * float(np.median(distance_m)), output_type="ndarray")
     piece = components(pairs, len(rest))
     farthest, nearest = np.zeros(len(rest)), np.full(len(rest), np.inf)
     np.maximum.at(farthest, piece, distance)

@@ -40,12 +40,13 @@ eighths have no point within 10 mm), F-score at 5 mm 0.978; 53 s of the processo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from tourgen.errors import StageError
-from tourgen.geometry import Float32, Mesh, OrientedCloud
+from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud
 from tourgen.stages.surface.marching_cubes import (
     CELL_CORNERS,
     STEPS,
@@ -64,6 +65,8 @@ _STEEPEST = 1.2
 """Most change of the distance over the way; a little more than 1 for the blend."""
 _ACROSS = 0.1
 """Share of the weight across a crease from which on it is one."""
+_FADE = 0.3
+"""Last part of a plane's reach over which the surface beyond takes over."""
 _DENSEST, _SPARSEST = 0.5, 2.0
 """The part of the room's spacing that a region's own counts for, at least and at most."""
 
@@ -123,6 +126,16 @@ def signed_distance(oriented: OrientedCloud, settings: Settings) -> Mesh:
         InputError: The room has more than two million cells from end to end.
         StageError: There is no surface.
     """
+    return zero_set(supported_planes(oriented, settings), settings, oriented.cloud.origin)
+
+
+def supported_planes(oriented: OrientedCloud, settings: Settings) -> TangentPlanes:
+    """The planes that their neighbours do not contradict.
+
+    Raises:
+        InputError: The room has more than two million cells from end to end.
+        StageError: There are none.
+    """
     oriented = distinct_samples(oriented)
     extent_m = float(np.ptp(oriented.cloud.points, axis=0).max())
     require_range("cell_m", settings.cell_m, extent_m / most_cells(), 1)
@@ -135,16 +148,46 @@ def signed_distance(oriented: OrientedCloud, settings: Settings) -> Mesh:
             "surface: expected points that agree on a surface, found none",
             "check the normals, or thin the scan less",
         )
-    field = _Field(planes, settings)
-    key, value = _grown(field, planes.points)
-    mesh = marching_cubes(
-        key, value, field.low, settings.cell_m, oriented.cloud.origin, steepest=_STEEPEST
-    )
+    return planes
+
+
+def zero_set(
+    planes: TangentPlanes, settings: Settings, origin: Float64, beyond: Beyond | None = None
+) -> Mesh:
+    """Where the distance is zero.
+
+    Args:
+        planes: That touch the surface.
+        settings: See ``Settings``.
+        origin: Of the planes and the mesh.
+        beyond: What goes on where the distance is unknown; without it the surface ends there.
+
+    Raises:
+        StageError: Nowhere.
+    """
+    field = _Field(planes, settings, beyond)
+    seeds = [planes.points] if beyond is None else [planes.points, beyond.seeds]
+    key, value = _grown(field, np.concatenate(seeds))
+    mesh = marching_cubes(key, value, field.low, settings.cell_m, origin, steepest=_STEEPEST)
     if not len(mesh.faces):
         raise StageError(
             "surface: expected a surface, found none", "check the normals, or take larger cells"
         )
     return mesh
+
+
+class Beyond(Protocol):
+    """A surface that goes on where the points end.
+
+    Attributes:
+        seeds: (m, 3) float32, places on it, metres.
+    """
+
+    seeds: Float32
+
+    def distance(self, places: Float32) -> Float32:
+        """(n,) metres that each of (n, 3) places lies in front of it."""
+        ...
 
 
 class _Field:
@@ -155,17 +198,20 @@ class _Field:
         cell_m: Edge of a cell.
     """
 
-    def __init__(self, planes: TangentPlanes, settings: Settings) -> None:
+    def __init__(self, planes: TangentPlanes, settings: Settings, beyond: Beyond | None) -> None:
         spacing_m = np.clip(
             planes.spacing_m, _DENSEST * settings.spacing_m, _SPARSEST * settings.spacing_m
         )
-        self._planes = planes
+        self._planes, self._beyond = planes, beyond
         self._reach_m = np.float32(settings.reach) * spacing_m + np.float32(settings.noise_m)
         self._alike = np.float32(np.cos(np.radians(2 * settings.crease_deg)))
         self._count = min(settings.blend + 1, len(planes.points))
         self._tree = cKDTree(planes.points)
         self.cell_m = np.float32(settings.cell_m)
-        self.low = planes.points.min(axis=0) - self._reach_m.max() - 2 * self.cell_m
+        low = planes.points.min(axis=0)
+        if beyond is not None:
+            low = np.minimum(low, beyond.seeds.min(axis=0, initial=np.inf))
+        self.low = low - self._reach_m.max() - 2 * self.cell_m
 
     def __call__(self, key: Keys) -> Float32:
         """(n,) distances at (n,) corners, NaN where unknown."""
@@ -186,7 +232,14 @@ class _Field:
         weight[:, 0] += np.float32(1e-6)  # all may be equally far
         weight /= weight.sum(axis=1, keepdims=True)
         blended = self._over_both_sides(self._planes.points[near], normals, offset, height, weight)
-        return np.where(known, blended, np.float32(np.nan))
+        if self._beyond is None:
+            return np.where(known, blended, np.float32(np.nan))
+        far = np.sqrt(np.maximum(foot_m2, np.square(height[:, 0]))) / reach_m
+        share = np.clip((1 - far) / _FADE, 0, 1)
+        open_ = share < 1
+        blended[open_] *= share[open_]
+        blended[open_] += (1 - share[open_]) * self._beyond.distance(place[open_])
+        return blended
 
     def _over_both_sides(
         self, points: Float32, normals: Float32, offset: Float32, height: Float32, weight: Float32
