@@ -14,7 +14,6 @@ from typing import Any
 
 from tourgen.cache import Cache, Cost
 from tourgen.fitting import picture, points, surface
-from tourgen.fitting.lengths import corners
 from tourgen.geometry import View
 from tourgen.progress import Listener, Started
 from tourgen.stages import (
@@ -38,7 +37,6 @@ from tourgen.stages import (
     trim,
     unwrap,
 )
-from tourgen.stages.surface import poisson
 from tourgen.tasks import Runner, Task, in_order, missing_tasks, task, why
 from tourgen.tour import Room, Tour
 
@@ -153,23 +151,35 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         libraries=("open3d", "scipy"),
     )
     oriented = task("floor", points.floored, turned, spaced, version=floor.VERSION)
-    solved = task(
-        "surface",
-        surface.solved,
-        oriented,
-        spaced,
-        settings=surface.Solving(detail_mm, room.surface.depth),
-        version=poisson.VERSION,
-        libraries=("open3d",),
+    found = (
+        task(
+            "mesh",
+            partial(surface.mended, room, folder),
+            cleaned,
+            settings=surface.Mended(room.mesh, room.unit, room.up),
+            digests=(digests[folder / room.mesh],),
+            version=1,
+            libraries=("trimesh",),
+        )
+        if room.mesh
+        else task(
+            "surface",
+            partial(surface.drawn, room.surface),
+            oriented,
+            spaced,
+            settings=surface.drawing(room.surface),
+            version=surface.VERSION,
+            libraries=("open3d", "scipy"),
+        )
     )
     trimmed = task(
         "trim",
         surface.trimmed,
-        solved,
+        found,
         oriented,
         cleaned,
         spaced,
-        settings=surface.Trimming(tuple(corners(box) for box in room.closed)),
+        settings=surface.trimming(room),
         version=trim.VERSION,
         libraries=("scipy",),
     )
@@ -258,7 +268,16 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         libraries=("open3d", "scipy"),
     )
     summary = task(
-        "summary", picture.summarised, scanned, cleaned, joined, sifted, tree, files, version=2
+        "summary",
+        picture.summarised,
+        scanned,
+        cleaned,
+        joined,
+        sifted,
+        found,
+        tree,
+        files,
+        version=3,
     )
     scan_mb = sum((folder / each.file).stat().st_size for each in room.scans) / 1e6
     return RoomRecipe(room, scan_mb, files, pictured, entered, measured, summary)
@@ -292,6 +311,7 @@ class RoomResult:
 def tour_recipes(tour: Tour, cache: Cache) -> tuple[RoomRecipe, ...]:
     """The recipe of every room."""
     files = [tour.folder / scan.file for room in tour.rooms for scan in room.scans]
+    files += [tour.folder / room.mesh for room in tour.rooms if room.mesh]
     digests = cache.file_digests(files)
     return tuple(room_recipe(room, tour.folder, digests) for room in tour.rooms)
 

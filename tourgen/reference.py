@@ -32,7 +32,7 @@ from tourgen.tour import (
     Viewpoint,
 )
 from tourgen.tour_faults import keys, tables
-from tourgen.tour_values import Form, as_room_id
+from tourgen.tour_values import Form, OnlyWith, as_room_id
 
 _TABLES: Final[tuple[tuple[str, type[BaseModel], str], ...]] = (
     ("[tour]", TourHead, ""),
@@ -207,12 +207,21 @@ def _title(name: str) -> str:
 def _hints(model: type[BaseModel]) -> Iterator[str]:
     """A line for each key that has a value when it is left out, its tables below."""
     for key, info in keys(model).items():
-        if _default(info):
+        if _default(info) and _is_at_home(info):
             yield f"# {key} = {_default(info)}  # {info.description}"
     for key, table in tables(model).items():
         if isinstance(keys(model)[key].default, BaseModel):
             yield f"# [room.{key}]"
             yield from _hints(table)
+
+
+def _is_at_home(info: FieldInfo) -> bool:
+    """Whether the key may stand beside the method that holds when none is named."""
+    return all(
+        keys(Surface)["method"].default in each.methods
+        for each in info.metadata
+        if isinstance(each, OnlyWith)
+    )
 
 
 def _door(room_id: str, room_ids: list[str]) -> Iterator[str]:

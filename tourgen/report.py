@@ -42,6 +42,7 @@ def _room_report(room: RoomResult) -> Mapping[str, Any]:
         "points_used": summary.points_used,
         "stations": summary.stations.round(3).tolist(),
         "station_moved_mm": summary.station_moved_mm.round(2).tolist(),
+        "surface": summary.surface,
         "area_m2": round(quality.area_m2, 2),
         "tiles": [level.tiles for level in summary.levels],
         "faces": [level.faces for level in summary.levels],

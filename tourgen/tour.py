@@ -33,9 +33,11 @@ from tourgen.tour_faults import faults_of
 from tourgen.tour_values import (
     Context,
     File,
+    Form,
     Languages,
     NeighbourRef,
     Number,
+    OnlyWith,
     Pose,
     Position,
     RoomId,
@@ -124,11 +126,21 @@ class Clean(_Table):
     )
 
 
+_POISSON: Final = OnlyWith(("poisson",))
+_BALLS: Final = OnlyWith(("ball-pivoting",))
+_DISTANCE: Final = OnlyWith(("auto", "signed-distance"))
+_CRUST: Final = OnlyWith(("crust",))
+
+
 class Surface(_Table):
     """How the surface is made from the points."""
 
-    method: Literal["poisson"] = Field(
-        default="poisson", description="The method: Poisson reconstruction."
+    method: Literal["auto", "poisson", "ball-pivoting", "signed-distance", "crust"] = Field(
+        default="auto",
+        description="The method. `auto`: signed distance where the scan is dense, Poisson across "
+        "its gaps. `poisson`: closes every gap, rounds edges. `ball-pivoting`: a mesh of the "
+        "points themselves, open where they end. `signed-distance`: flat walls and sharp edges, "
+        "open where the points end; the fastest, for a preview. `crust`: for small clean clouds.",
     )
     detail_mm: Number | None = Field(
         default=None,
@@ -137,13 +149,83 @@ class Surface(_Table):
         description="The finest detail that the surface shall show. Left out: the spacing of the "
         "scan's points in the middle, at least 6.",
     )
-    depth: Whole | None = Field(
+    offset_mm: Number = Field(
+        default=0.0,
+        ge=-100,
+        le=100,
+        description="Moves the surface along its normals, into the room; below zero, away from it.",
+    )
+    depth: Annotated[Whole | None, _POISSON] = Field(
         default=None,
         ge=5,
         le=12,
-        description="The octree's depth, whatever `detail_mm` says; a step halves its cells and "
-        "takes four times the memory and time. Left out: such that its cells are as wide as "
-        "`detail_mm`.",
+        description="`poisson`: the octree's depth, whatever `detail_mm` says; a step halves its "
+        "cells and takes four times the memory and time. Left out: such that its cells are as "
+        "wide as `detail_mm`.",
+    )
+    full_depth: Annotated[Whole, _POISSON] = Field(
+        default=5,
+        ge=1,
+        le=8,
+        description="`poisson`: down to this depth the octree is complete, points or none.",
+    )
+    samples_per_node: Annotated[Number, _POISSON] = Field(
+        default=1.0,
+        ge=0.5,
+        le=20,
+        description="`poisson`: how many points make a cell; 15 to 20 for a noisy scan.",
+    )
+    point_weight: Annotated[Number, _POISSON] = Field(
+        default=16.0,
+        ge=0,
+        le=100,
+        description="`poisson`: how strongly the surface is drawn through the points; 0 is the "
+        "unscreened method.",
+    )
+    linear_fit: Annotated[bool, _POISSON, Form("true or false")] = Field(
+        default=False,
+        strict=True,
+        description="`poisson`: places vertices by linear instead of quadratic interpolation.",
+    )
+    radii_mm: Annotated[tuple[Number, ...] | None, _BALLS, Form("list of numbers")] = Field(
+        default=None,
+        min_length=1,
+        max_length=8,
+        description="`ball-pivoting`: radii of the balls, small to large. Left out: once, twice "
+        "and four times the spacing of the points.",
+    )
+    agree_deg: Annotated[Number, _BALLS] = Field(
+        default=75.0,
+        ge=10,
+        le=90,
+        description="`ball-pivoting`: a face whose normal lies farther from that of one of its "
+        "points is dropped.",
+    )
+    crease_deg: Annotated[Number, _DISTANCE] = Field(
+        default=12.0,
+        ge=3,
+        le=45,
+        description="`auto`, `signed-distance`: spread of the normals on one side of a crease; "
+        "less keeps creases sharper and walls rougher.",
+    )
+    neighbours: Annotated[Whole, _DISTANCE] = Field(
+        default=16,
+        ge=4,
+        le=64,
+        description="`auto`, `signed-distance`: points that speak for a plane; more are smoother.",
+    )
+    reach: Annotated[Number, _DISTANCE] = Field(
+        default=1.5,
+        ge=0.5,
+        le=5,
+        description="`auto`, `signed-distance`: how far a point's plane goes on, in spacings.",
+    )
+    filter_deg: Annotated[Number, _CRUST] = Field(
+        default=60.0,
+        ge=10,
+        le=90,
+        description="`crust`: how far a face may lie from square to the line to the pole at its "
+        "widest corner.",
     )
 
 
@@ -226,6 +308,12 @@ class Room(_Table):
     )
     clean: Clean = Field(default=Clean(), description="Which points are kept.")
     surface: Surface = Field(default=Surface(), description="How the surface is made.")
+    mesh: File | None = Field(
+        default=None,
+        description="A surface mended elsewhere (.ply, .obj, .stl, .glb), in the coordinates of "
+        "the scans; it is taken as it is, and coloured from the scans. Left out: the surface is "
+        "made from the points.",
+    )
     texture: Texture = Field(default=Texture(), description="How fine the pictures are.")
     links: tuple[Link, ...] = Field(default=(), alias="link", description="Doors to other rooms.")
     notes: tuple[Note, ...] = Field(default=(), alias="note", description="Marks with texts.")

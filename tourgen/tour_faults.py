@@ -16,6 +16,11 @@ from tourgen.tour_values import listed, near, shown
 
 _CONTROL: Final = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 
+_EXPLAINED: Final[Mapping[str, str]] = {
+    "solver_divide": "it belonged to the older, unscreened Poisson solver: the depth from which "
+    "on that one solved in blocks, to save memory; the screened solver needs none; set `depth`",
+}
+
 Location = tuple[int | str, ...]
 
 
@@ -115,7 +120,11 @@ def _unknown_key(location: Location, model: type[BaseModel]) -> tuple[str, str]:
     # a key of a table below, written one table too high
     inner = {key: f"{table}.{key}" for table, sub in tables(model).items() for key in keys(sub)}
     match = difflib.get_close_matches(name, list(inner), 1)
-    hint = near(name, known) or (f"did you mean `{inner[match[0]]}`?" if match else "")
+    hint = (
+        _EXPLAINED.get(name)
+        or near(name, known)
+        or (f"did you mean `{inner[match[0]]}`?" if match else "")
+    )
     return f"unknown key, {listed(known)}", hint
 
 

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Annotated, Final, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
-from pydantic_core import PydanticCustomError
+from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandler, ValidationInfo
+from pydantic_core import PydanticCustomError, core_schema
 
 _ROOM_ID: Final = re.compile(r"(?!(con|prn|aux|nul|com\d|lpt\d)$)[a-z0-9][a-z0-9_-]{0,63}")
 _LANGUAGE: Final = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{2,8})*")
@@ -198,6 +198,29 @@ def _check_languages(value: tuple[str, ...]) -> tuple[str, ...]:
     if len(set(value)) < len(value):
         raise fault(f"expected each language once, found {shown(list(value))}")
     return value
+
+
+@dataclass(frozen=True)
+class OnlyWith:
+    """For a key that means something to some of the values of the `method` above it only."""
+
+    methods: tuple[str, ...]
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        """Check before the value itself is."""
+        return core_schema.with_info_before_validator_function(self._check, handler(source))
+
+    def _check(self, value: object, info: core_schema.ValidationInfo) -> object:
+        method = info.data.get("method")  # none where it is itself at fault
+        if method is not None and method not in self.methods:
+            raise fault(
+                f"expected this key with method {' or '.join(map(shown, self.methods))}, "
+                f"found method {shown(method)}",
+                f"leave it out, or set `method = {shown(self.methods[0])}`",
+            )
+        return value
 
 
 @dataclass(frozen=True)

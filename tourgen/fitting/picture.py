@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from tourgen.fitting.lengths import Corner
 from tourgen.fitting.points import RoomScan, moved
+from tourgen.fitting.surface import Drawn
 from tourgen.geometry import Float64, OrientedCloud, PointCloud, TexturedMesh, Tile, UvMesh, View
 from tourgen.scans import ReadFacts
 from tourgen.stages import bake, entry, levels, pack, poster, register, sift, unwrap
@@ -66,6 +67,7 @@ class Summary:
         stations: (s, 3) float64, given or found, metres from the origin.
         station_moved_mm: (s,) float64, how far registration moved each.
         removed: Points dropped by cleaning, by cause.
+        surface: Which method drew it and why.
         levels: Coarsest first.
     """
 
@@ -76,6 +78,7 @@ class Summary:
     stations: Float64
     station_moved_mm: Float64
     removed: Mapping[str, int]
+    surface: str
     levels: tuple[Level, ...]
 
 
@@ -171,6 +174,7 @@ def summarised(
     cloud: PointCloud,
     joined: register.Registered,
     kept: sift.Sifted,
+    found: Drawn,
     room: tuple[Tile, ...],
     files: Mapping[str, bytes],
 ) -> Summary:
@@ -184,6 +188,7 @@ def summarised(
         joined.stations,
         joined.moved_mm,
         kept.removed,
+        found.told,
         tuple(_level(room, files, depth) for depth in range(_depth(room) + 1)),
     )
 

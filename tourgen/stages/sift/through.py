@@ -28,6 +28,8 @@ from tourgen.stages.sight import DepthBuffer, depth_buffer
 
 Mask = npt.NDArray[np.bool_]
 _CELL_STEPS = 1.25
+_FINEST_RAD = 1e-3
+"""Beams nearer to each other share cells: finer ones, of a station far away, fill the memory."""
 _LEAST_BEAMS = 5
 _SAMPLE = 20_000
 _ROUNDS = 4
@@ -94,7 +96,7 @@ def _step(view: View) -> float:
     rng = np.random.default_rng(0)
     sample = rng.choice(len(view), min(_SAMPLE, len(view)), replace=False)
     distance, _ = view.tree.query(view.direction[sample], k=[2, 3, 4, 5], workers=-1)
-    return max(float(np.median(distance)), 1e-4)
+    return max(float(np.median(distance)), _FINEST_RAD)
 
 
 def grown(cloud: PointCloud, gone: Mask) -> Mask:

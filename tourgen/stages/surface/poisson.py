@@ -13,7 +13,7 @@ import numpy as np
 from tourgen.errors import StageError
 from tourgen.geometry import Mesh, OrientedCloud
 
-VERSION = 1
+VERSION = 2
 _SCALE = 1.1  # the solver's cube over the cloud's box
 
 
@@ -24,14 +24,18 @@ class Settings:
     Attributes:
         cell_m: Width of the octree's finest cells.
         depth: The octree's depth, or 0 to derive it from ``cell_m``.
+        full_depth: Down to it the octree is complete, points or none.
         samples_per_node: Points that make a cell worth splitting; more for noisy scans.
         point_weight: How strongly the surface is drawn through the points.
+        linear_fit: Place vertices by linear instead of quadratic interpolation.
     """
 
     cell_m: float
     depth: int = 0
+    full_depth: int = 5
     samples_per_node: float = 1.0
     point_weight: float = 16.0
+    linear_fit: bool = False
 
 
 def poisson(oriented: OrientedCloud, settings: Settings) -> Mesh:
@@ -56,6 +60,8 @@ def poisson(oriented: OrientedCloud, settings: Settings) -> Mesh:
         pcd,
         depth=settings.depth or octree_depth(points, settings.cell_m),
         scale=_SCALE,
+        linear_fit=settings.linear_fit,
+        full_depth=settings.full_depth,
         samples_per_node=settings.samples_per_node,
         point_weight=settings.point_weight,
     )

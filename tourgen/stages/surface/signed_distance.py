@@ -57,7 +57,12 @@ from tourgen.stages.surface.marching_cubes import (
     most_cells,
 )
 from tourgen.stages.surface.samples import distinct_samples, require_range
-from tourgen.stages.surface.tangent_planes import Smoothing, TangentPlanes, tangent_planes
+from tourgen.stages.surface.tangent_planes import (
+    Smoothing,
+    TangentPlanes,
+    noise_of,
+    tangent_planes,
+)
 
 VERSION = 1
 _CHUNK = 1 << 17
@@ -79,7 +84,7 @@ class Settings:
         cell_m: Edge of the grid's cells, 0.5 mm to 1 m; as wide as the spacing does, two
             thirds of it draw edges a little sharper.
         spacing_m: Distance between neighbouring points in the middle of the room, 0.1 mm to 1 m.
-        noise_m: Standard deviation of the range, 0 to 0.1 m.
+        noise_m: Standard deviation of the points about the surface, 0 to 0.1 m; None measures it.
         neighbours: Points that speak for a tangent plane, 4 to 64.
         crease_deg: Spread of the normals on one side of a crease, 3° to 45°; twice as much makes
             one. Less keeps creases sharper and walls rougher.
@@ -93,7 +98,7 @@ class Settings:
 
     cell_m: float
     spacing_m: float
-    noise_m: float = 0.0015
+    noise_m: float | None = None
     neighbours: int = 16
     crease_deg: float = 12.0
     blend: int = 6
@@ -103,7 +108,8 @@ class Settings:
     def __post_init__(self) -> None:
         require_range("cell_m", self.cell_m, 0.0005, 1)
         require_range("spacing_m", self.spacing_m, 0.0001, 1)
-        require_range("noise_m", self.noise_m, 0, 0.1)
+        if self.noise_m is not None:
+            require_range("noise_m", self.noise_m, 0, 0.1)
         require_range("neighbours", self.neighbours, 4, 64)
         require_range("crease_deg", self.crease_deg, 3, 45)
         require_range("blend", self.blend, 1, 32)
@@ -139,7 +145,8 @@ def supported_planes(oriented: OrientedCloud, settings: Settings) -> TangentPlan
     oriented = distinct_samples(oriented)
     extent_m = float(np.ptp(oriented.cloud.points, axis=0).max())
     require_range("cell_m", settings.cell_m, extent_m / most_cells(), 1)
-    noise_m = max(settings.noise_m, settings.spacing_m / 100)
+    noise_m = noise_of(oriented) if settings.noise_m is None else settings.noise_m
+    noise_m = max(noise_m, settings.spacing_m / 100)
     smoothing = Smoothing(settings.neighbours, settings.crease_deg, noise_m)
     planes = tangent_planes(oriented, smoothing)
     planes = planes.take(planes.support >= settings.support)
@@ -203,7 +210,7 @@ class _Field:
             planes.spacing_m, _DENSEST * settings.spacing_m, _SPARSEST * settings.spacing_m
         )
         self._planes, self._beyond = planes, beyond
-        self._reach_m = np.float32(settings.reach) * spacing_m + np.float32(settings.noise_m)
+        self._reach_m = np.float32(settings.reach) * spacing_m + np.float32(planes.noise_m)
         self._alike = np.float32(np.cos(np.radians(2 * settings.crease_deg)))
         self._count = min(settings.blend + 1, len(planes.points))
         self._tree = cKDTree(planes.points)

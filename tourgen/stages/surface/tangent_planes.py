@@ -29,6 +29,10 @@ from tourgen.geometry import Float32, Int32, OrientedCloud
 _CHUNK = 1 << 16
 _NORMAL_PASSES = 2
 _POINT_PASSES = 2
+_NOISE_SAMPLE = 20_000
+_NOISE_NEIGHBOURS = 8
+_ALIKE = np.cos(np.radians(20.0))
+_MEDIAN_TO_DEVIATION = 1.4826
 _WIDTH = 0.7
 """Of the Gaussian, over the distance to the last neighbour."""
 
@@ -42,17 +46,23 @@ class TangentPlanes:
         normals: (n, 3) float32, unit length, toward the free space.
         spacing_m: (n,) float32, distance between neighbouring points around.
         support: (n,) float32, share of the neighbours that lie on the plane, 0 to 1.
+        noise_m: Standard deviation of the points that they were fitted to.
     """
 
     points: Float32
     normals: Float32
     spacing_m: Float32
     support: Float32
+    noise_m: float
 
     def take(self, index: npt.NDArray[np.generic]) -> TangentPlanes:
         """The planes that ``index`` (a mask or positions) selects."""
         return TangentPlanes(
-            self.points[index], self.normals[index], self.spacing_m[index], self.support[index]
+            self.points[index],
+            self.normals[index],
+            self.spacing_m[index],
+            self.support[index],
+            self.noise_m,
         )
 
 
@@ -69,6 +79,27 @@ class Smoothing:
     neighbours: int
     crease_deg: float
     noise_m: float
+
+
+def noise_of(oriented: OrientedCloud) -> float:
+    """Standard deviation of the points about the surface, metres.
+
+    The nearest of the neighbours that look the same way lies as high over a point's plane as the
+    noise of both puts it; the median of that height bears creases and strays.
+    """
+    points, normals = oriented.cloud.points, oriented.normals
+    chosen = np.random.default_rng(0).permutation(len(points))[:_NOISE_SAMPLE]
+    rank = np.arange(2, min(_NOISE_NEIGHBOURS + 1, len(points)) + 1)
+    near = np.asarray(cKDTree(points).query(points[chosen], k=rank, workers=-1)[1])
+    if not near.size:
+        return 0.0
+    normal = normals[chosen, None] + normals[near]
+    normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6)
+    height = np.abs(np.einsum("ikj,ikj->ik", points[near] - points[chosen, None], normal))
+    alike = np.einsum("ij,ikj->ik", normals[chosen], normals[near]) > _ALIKE
+    if not alike.any():
+        return 0.0
+    return float(np.median(height[alike]) * _MEDIAN_TO_DEVIATION / np.sqrt(2))
 
 
 def tangent_planes(oriented: OrientedCloud, settings: Smoothing) -> TangentPlanes:
@@ -91,7 +122,7 @@ def tangent_planes(oriented: OrientedCloud, settings: Smoothing) -> TangentPlane
     support = np.empty(0, np.float32)
     for _ in range(_POINT_PASSES):
         points, support = _moved(points, normals, near, settings)
-    return TangentPlanes(points, normals, spacing_m, support)
+    return TangentPlanes(points, normals, spacing_m, support, settings.noise_m)
 
 
 def _smoothed(points: Float32, normals: Float32, near: Int32, settings: Smoothing) -> Float32:
