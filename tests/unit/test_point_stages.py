@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tourgen.errors import InputError
 from tourgen.geometry import OrientedCloud, PointCloud
-from tourgen.stages import floor, normals, sift, sight, spacing, stations, thin
+from tourgen.stages import floor, free_space, normals, sift, sight, spacing, stations, thin
 
 ROOM_M = np.array([4.0, 5.0, 2.6])
 
@@ -131,7 +131,8 @@ def test_where_no_disc_is_none_is_found() -> None:
 # ------------------------------------------------------------------ sight, normals
 
 
-def test_a_station_sees_what_nothing_hides_and_knows_what_is_empty() -> None:
+@pytest.mark.parametrize("owner", [0, -1])
+def test_a_station_sees_what_nothing_hides_and_knows_what_is_empty(owner: int) -> None:
     eye = np.array([0.0, 0.0, 1.5])
     points, inward = box_points(200_000)
     rng = np.random.default_rng(5)
@@ -154,7 +155,9 @@ def test_a_station_sees_what_nothing_hides_and_knows_what_is_empty() -> None:
     assert buffer.sees(np.float32(points[clear]), cosine[clear]).mean() > 0.995
     glass = np.float32(points[window] * [0.8, 1, 1])
     inner = (np.abs(glass[:, 0]) < 0.3) & (np.abs(glass[:, 2] - 1.5) < 0.3)
-    free = sight.free_space(seen, eye[None], 0.75, -58, 0.08)
+    visible = buffer.sees(seen, np.ones(len(seen), np.float32)) if owner == 0 else slice(None)
+    measured = cloud(seen[visible], owner)
+    free = free_space.free_space(measured, eye[None], 1.1, -58, 0.08)
     assert free.holds(glass[inner]).all()
     assert free.leads_out(glass[inner]).all()
     assert not free.holds(np.float32(points[~window])).any()

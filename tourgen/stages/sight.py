@@ -1,8 +1,6 @@
 """Sight: what a scanner standing somewhere would see of a cloud.
 
-A spherical depth buffer: for each direction, the nearest point. It answers two questions that
-normals and trimming ask: is this point visible from there, and is this place known to be empty,
-because a station measured what lies behind it, or nothing at all?
+A spherical depth buffer: for each direction, the nearest point.
 """
 
 from __future__ import annotations
@@ -11,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import minimum_filter
 
 from tourgen.geometry import Float32, Float64
 
@@ -49,50 +46,6 @@ class DepthBuffer:
         slant = np.minimum(np.sqrt(1 - cosine**2) / np.maximum(np.abs(cosine), 1e-3), 8.0)
         span_m = distance * np.float32(np.radians(self.cell_deg)) * slant
         return np.asarray(distance - span_m - margin_m <= self.range_m.reshape(-1)[cell])
-
-
-@dataclass(frozen=True, slots=True)
-class FreeSpace:
-    """What stations know to be empty.
-
-    Attributes:
-        buffers: One a station; each cell holds the nearest of its own and the cells around.
-        lowest_deg: Lower edge of the scanners' field of view.
-        margin_m: How far in front of what was measured a place is known to be empty.
-    """
-
-    buffers: tuple[DepthBuffer, ...]
-    lowest_deg: float
-    margin_m: float
-
-    def holds(self, points: Float32) -> npt.NDArray[np.bool_]:
-        """Mask of the (n, 3) places where a surface would have been measured and was not."""
-        free = np.zeros(len(points), bool)
-        for buffer in self.buffers:
-            cell, distance, elevation = buffer.cells(points)
-            reach_m = buffer.range_m.reshape(-1)[cell]
-            free |= (distance + self.margin_m < reach_m) & (elevation > self.lowest_deg)
-        return free
-
-    def leads_out(self, points: Float32) -> npt.NDArray[np.bool_]:
-        """Mask of the (n, 3) places in whose direction a station measured nothing at all."""
-        out = np.zeros(len(points), bool)
-        for buffer in self.buffers:
-            cell, _, elevation = buffer.cells(points)
-            out |= np.isinf(buffer.range_m.reshape(-1)[cell]) & (elevation > self.lowest_deg)
-        return out
-
-
-def free_space(
-    points: Float32, stations: Float64, cell_deg: float, lowest_deg: float, margin_m: float
-) -> FreeSpace:
-    """What (s, 3) stations that measured (n, 3) points know to be empty."""
-    buffers = []
-    for station in stations:
-        buffer = depth_buffer(points, station, cell_deg)
-        nearest = minimum_filter(buffer.range_m, size=3, mode=("nearest", "wrap"))
-        buffers.append(DepthBuffer(station, cell_deg, nearest))
-    return FreeSpace(tuple(buffers), lowest_deg, margin_m)
 
 
 def depth_buffer(points: Float32, station: Float64, cell_deg: float) -> DepthBuffer:

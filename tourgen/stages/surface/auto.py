@@ -2,9 +2,14 @@
 
 Near points, Hoppe's distance draws flat walls flat and edges sharp, and costs little; it ends where
 the points do. The solve closes every gap smoothly, but rounds every edge off and costs most of a
-build at the same detail. So the solve is made with coarser cells, from the same smoothed tangent
-planes, and its surface goes on where the distance is unknown; over the last part of a plane's reach
-the one fades into the other, so that there is one field and one watertight surface.
+build at the same detail. So the solve is made with
+coarser cells, from points spread evenly over the surface that the distance drew, and its surface
+goes on where the distance is unknown: there is one field, and one watertight mesh.
+
+Tried: the solve from the tangent planes themselves. A board of 25 mm whose one side is seen at a
+grazing angle only, with its points in sparse rows, dissolved, and the surface bulged out into the
+room (chamber1: 98.6 instead of 99.0 % of what is seen within 10 mm, 3.7 instead of 2.9 mm at the
+95th percentile).
 
 Where most of a scan lies farther apart than planes reach, there is little that the distance could
 draw: then all of it is left to the solve, at full detail.
@@ -12,16 +17,17 @@ draw: then all of it is left to the solve, at full detail.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from tourgen.geometry import Float32, Mesh, OrientedCloud
+from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud, PointCloud
 from tourgen.stages.mesh_arrays import face_areas, vertex_normals
 from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.tangent_planes import TangentPlanes
+from tourgen.stages.thin import voxel_groups
 
 VERSION = 1
 Mask = npt.NDArray[np.bool_]
@@ -73,26 +79,40 @@ def auto(oriented: OrientedCloud, settings: Settings) -> Chosen:
         StageError: There is no surface.
     """
     planes = signed_distance.supported_planes(oriented, settings.distance)
-    solved = poisson.poisson(_smoothed(oriented, planes), settings.solve)
+    known = signed_distance.distances(planes, settings.distance)
+    dense = known.zero_set(oriented.cloud.origin)
+    solved = poisson.poisson(_evenly(dense, settings), settings.solve)
     reach_m = settings.distance.reach * settings.distance.spacing_m
-    dense = _near(solved, planes, reach_m)
-    area = face_areas(solved)
-    if (area * dense).sum() < settings.least_share * area.sum():
+    dense_share = _share(solved, planes, reach_m)
+    if dense_share < settings.least_share:
         return Chosen(poisson.poisson(_smoothed(oriented, planes), settings.alone), 0.0)
-    mesh = signed_distance.zero_set(
-        planes, settings.distance, oriented.cloud.origin, _Closed(solved, ~dense)
-    )
-    dense = _near(mesh, planes, reach_m)
-    area = face_areas(mesh)
-    return Chosen(mesh, float((area * dense).sum() / area.sum()))
+    gap = ~_near(solved, planes, reach_m)
+    mesh = known.carried_on(_Closed(solved, gap)).zero_set(oriented.cloud.origin)
+    return Chosen(mesh, _share(mesh, planes, reach_m))
+
+
+def _evenly(mesh: Mesh, settings: Settings) -> OrientedCloud:
+    """The places on a mesh, as far apart as the solve's cells are wide, as points for it."""
+    order, starts = voxel_groups(mesh.vertices, settings.solve.cell_m / 2)
+    at = order[starts]
+    return _as_points(mesh.origin, mesh.vertices[at], vertex_normals(mesh)[at])
 
 
 def _smoothed(oriented: OrientedCloud, planes: TangentPlanes) -> OrientedCloud:
     """The planes as points for a solve."""
-    nobody = np.full(len(planes.points), -1, np.int16)
-    colors = np.zeros((len(planes.points), 3), np.uint8)
-    cloud = replace(oriented.cloud, points=planes.points, colors=colors, station=nobody)
-    return replace(oriented, cloud=cloud, normals=planes.normals)
+    return _as_points(oriented.cloud.origin, planes.points, planes.normals)
+
+
+def _as_points(origin: Float64, points: Float32, normals: Float32) -> OrientedCloud:
+    nobody = np.full(len(points), -1, np.int16)
+    cloud = PointCloud(origin, points, np.zeros((len(points), 3), np.uint8), nobody)
+    return OrientedCloud(cloud, normals, np.empty((0, 3)))
+
+
+def _share(mesh: Mesh, planes: TangentPlanes, most_m: float) -> float:
+    """The part of a mesh's area that lies within ``most_m`` of a plane's point."""
+    area = face_areas(mesh)
+    return float((area * _near(mesh, planes, most_m)).sum() / area.sum())
 
 
 def _near(mesh: Mesh, planes: TangentPlanes, most_m: float) -> Mask:
