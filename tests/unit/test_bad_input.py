@@ -84,7 +84,9 @@ def told(folder, capsys, command, text):
         (
             KITCHEN.format(scan="good.ply") + "surface = { detial_mm = 4 }\n",
             "tour.toml: room `kitchen`: surface.detial_mm: unknown key, "
-            "expected one of depth, detail_mm, method",
+            "expected one of agree_deg, crease_deg, depth, detail_mm, filter_deg, full_depth, "
+            "linear_fit, method, neighbours, offset_mm, point_weight, radii_mm, reach, "
+            "samples_per_node",
         ),
         (
             KITCHEN.format(scan="good.ply") + 'title = { it = "Cucina" }\n',
@@ -130,7 +132,7 @@ def test_faults_of_the_tour_file_do_not_hide_those_of_the_scans(folder):
         check_tour(folder)
     assert [fault.message for fault in caught.value.faults] == [
         "tour.toml: room `kitchen`: unti: unknown key, expected one of clean, closed, id, keep, "
-        "link, note, remove, scans, start, stations, surface, text, texture, title, unit, up",
+        "link, mesh, note, remove, scans, start, stations, surface, text, texture, title, unit, up",
         "tour.toml: room `hall`: link 1: to: room `atelier` does not exist",
         "room `kitchen`: scan `few.ply`: expected at least 10000 points, found 50",
     ]

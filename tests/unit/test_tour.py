@@ -205,7 +205,10 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(folder):
         ),
         (kitchen + "keep: expected min below max along y, found 0 and -1", ""),
         (
-            kitchen + "surface.detial_mm: unknown key, expected one of depth, detail_mm, method",
+            kitchen
+            + "surface.detial_mm: unknown key, expected one of agree_deg, crease_deg, depth, "
+            "detail_mm, filter_deg, full_depth, linear_fit, method, neighbours, offset_mm, "
+            "point_weight, radii_mm, reach, samples_per_node",
             "did you mean `detail_mm`?",
         ),
         (
@@ -243,10 +246,34 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(folder):
         ("clean = { min_points = 1.5 }", "clean.min_points: expected a whole number", ""),
         ("clean = { min_points = true }", "expected a whole number, found true", ""),
         ("clean = { min_points = 5 }", "clean.min_points: expected at least 100, found 5", ""),
-        ("surface = { depth = 99 }", "surface.depth: expected at most 12, found 99", ""),
+        (
+            'surface = { method = "poisson", depth = 99 }',
+            "surface.depth: expected at most 12, found 99",
+            "",
+        ),
+        (
+            "surface = { depth = 9 }",
+            'surface.depth: expected this key with method "poisson", found method "auto"',
+            'set `method = "poisson"`',
+        ),
+        (
+            'surface = { method = "crust", reach = 2 }',
+            'reach: expected this key with method "auto" or "signed-distance", found',
+            "leave it out",
+        ),
+        (
+            'surface = { method = "ball-pivoting", radii_mm = [] }',
+            "surface.radii_mm: expected at least one, found []",
+            "",
+        ),
+        ("surface = { solver_divide = 8 }", "solver_divide: unknown key", "older, unscreened"),
         ('surface = { detail_mm = "4" }', 'detail_mm: expected a number, found "4"', ""),
         ("surface = { detail_mm = inf }", "surface.detail_mm: expected a finite number", ""),
-        ('surface = { method = "poison" }', "method: expected poisson", "mean `poisson`?"),
+        (
+            'surface = { method = "poison" }',
+            "method: expected one of auto, poisson",
+            "mean `poisson`?",
+        ),
         ("title = 3", "title: expected a text or a table of texts by language, found 3", ""),
         ("title = {}", "title: expected a text or a table of texts by language", ""),
         ('title = { en = " " }', 'title: expected a text in language `en`, found " "', ""),

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud, PointCloud
+from tourgen.geometry import Float32, Mesh, OrientedCloud, PointCloud
 from tourgen.stages.mesh_arrays import face_areas, vertex_normals
 from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.tangent_planes import TangentPlanes
@@ -81,11 +81,12 @@ def auto(oriented: OrientedCloud, settings: Settings) -> Chosen:
     planes = signed_distance.supported_planes(oriented, settings.distance)
     known = signed_distance.distances(planes, settings.distance)
     dense = known.zero_set(oriented.cloud.origin)
+    if not len(dense.faces):
+        return Chosen(poisson.poisson(oriented, settings.alone), 0.0)
     solved = poisson.poisson(_evenly(dense, settings), settings.solve)
     reach_m = settings.distance.reach * settings.distance.spacing_m
-    dense_share = _share(solved, planes, reach_m)
-    if dense_share < settings.least_share:
-        return Chosen(poisson.poisson(_smoothed(oriented, planes), settings.alone), 0.0)
+    if _share(solved, planes, reach_m) < settings.least_share:
+        return Chosen(poisson.poisson(oriented, settings.alone), 0.0)
     gap = ~_near(solved, planes, reach_m)
     mesh = known.carried_on(_Closed(solved, gap)).zero_set(oriented.cloud.origin)
     return Chosen(mesh, _share(mesh, planes, reach_m))
@@ -95,18 +96,10 @@ def _evenly(mesh: Mesh, settings: Settings) -> OrientedCloud:
     """The places on a mesh, as far apart as the solve's cells are wide, as points for it."""
     order, starts = voxel_groups(mesh.vertices, settings.solve.cell_m / 2)
     at = order[starts]
-    return _as_points(mesh.origin, mesh.vertices[at], vertex_normals(mesh)[at])
-
-
-def _smoothed(oriented: OrientedCloud, planes: TangentPlanes) -> OrientedCloud:
-    """The planes as points for a solve."""
-    return _as_points(oriented.cloud.origin, planes.points, planes.normals)
-
-
-def _as_points(origin: Float64, points: Float32, normals: Float32) -> OrientedCloud:
-    nobody = np.full(len(points), -1, np.int16)
-    cloud = PointCloud(origin, points, np.zeros((len(points), 3), np.uint8), nobody)
-    return OrientedCloud(cloud, normals, np.empty((0, 3)))
+    nobody = np.full(len(at), -1, np.int16)
+    black = np.zeros((len(at), 3), np.uint8)
+    cloud = PointCloud(mesh.origin, mesh.vertices[at], black, nobody)
+    return OrientedCloud(cloud, vertex_normals(mesh)[at], np.empty((0, 3)))
 
 
 def _share(mesh: Mesh, planes: TangentPlanes, most_m: float) -> float:

@@ -131,7 +131,12 @@ def signed_distance(oriented: OrientedCloud, settings: Settings) -> Mesh:
         StageError: There is no surface.
     """
     planes = supported_planes(oriented, settings)
-    return distances(planes, settings).zero_set(oriented.cloud.origin)
+    mesh = distances(planes, settings).zero_set(oriented.cloud.origin)
+    if not len(mesh.faces):
+        raise StageError(
+            "surface: expected a surface, found none", "check the normals, or take larger cells"
+        )
+    return mesh
 
 
 def supported_planes(oriented: OrientedCloud, settings: Settings) -> TangentPlanes:
@@ -172,19 +177,9 @@ class Distances:
     value: Float32
 
     def zero_set(self, origin: Float64) -> Mesh:
-        """Where the distance is zero.
-
-        Raises:
-            StageError: Nowhere.
-        """
+        """Where the distance is zero; no faces where it nowhere is."""
         low, cell_m = self.field.low, float(self.field.cell_m)
-        mesh = marching_cubes(self.key, self.value, low, cell_m, origin, steepest=_STEEPEST)
-        if not len(mesh.faces):
-            raise StageError(
-                "surface: expected a surface, found none",
-                "check the normals, or take larger cells",
-            )
-        return mesh
+        return marching_cubes(self.key, self.value, low, cell_m, origin, steepest=_STEEPEST)
 
     def carried_on(self, beyond: Beyond) -> Distances:
         """The same, and where it is unknown the distance to another surface."""
