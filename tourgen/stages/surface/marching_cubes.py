@@ -4,17 +4,22 @@ The published table leaves holes where two cells cut the face between them in di
 Here the table is made, not typed: on every face of the cube the surface cuts off the corners in
 front of it, each alone, so that both cells of a face agree whatever lies around (the rule of
 Montani, Scateni and Scopigno 1994). A cell with a corner of unknown value stays open.
+
+The surface enters a cell as one or more loops of vertices on its edges. A loop is cut into a fan of
+triangles, or, where normals tell that a crease runs through it, given a vertex on the crease: see
+``features``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from tourgen.geometry import Float32, Float64, Int32, Mesh
+from tourgen.stages.surface.features import fans, with_features
 
 Keys = npt.NDArray[np.int64]
 
@@ -27,7 +32,8 @@ CELL_CORNERS: Keys = np.array(
 )
 """From a cell's lowest corner to each; bit 0 of a corner's number is x, 1 y, 2 z."""
 _EDGES = [(c, c | 1 << axis) for axis in range(3) for c in range(8) if not c >> axis & 1]
-_MOST_TRIANGLES = 5
+_MOST_LOOPS = 4
+_LONGEST_LOOP = 7
 _LEAST_SHARE = 1e-3
 """How near a vertex may come to a corner, in edges: nearer, its faces have no area."""
 
@@ -58,6 +64,7 @@ def marching_cubes(
     origin: Float64,
     *,
     steepest: float = np.inf,
+    normals: Callable[[Float32], Float32] | None = None,
 ) -> Mesh:
     """The surface where ``value`` is zero.
 
@@ -69,6 +76,8 @@ def marching_cubes(
         origin: Of the mesh.
         steepest: Cells along whose edges the value changes its sign by more, over the way, stay
             open: it jumps there.
+        normals: Tells the unit normals, toward the free space, at (v, 3) places on the surface, NaN
+            where they are unknown; with them creases are drawn sharp.
 
     Returns:
         Faces counter-clockwise seen from where the value is positive; cells share vertices.
@@ -82,7 +91,11 @@ def marching_cubes(
     smooth = _smooth(value[cells], np.float32(steepest * cell_m))
     cells, case = cells[smooth], case[smooth]
     vertex_of, vertices = _vertices(key, value, after, low, cell_m)
-    faces = _faces(cells, case, vertex_of)
+    loops = _loops_of(cells, case, vertex_of)
+    if normals is None:
+        faces = fans(loops)
+    else:
+        vertices, faces = with_features(vertices, loops, normals(vertices), cell_m)
     used, faces = _used(faces, len(vertices))
     return Mesh(origin, vertices[used], faces)
 
@@ -129,15 +142,16 @@ def _vertices(
     return number, vertices * np.float32(cell_m) + low
 
 
-def _faces(cells: Int32, case: npt.NDArray[np.int64], vertex_of: Int32) -> Int32:
+def _loops_of(cells: Int32, case: npt.NDArray[np.int64], vertex_of: Int32) -> Int32:
+    """(l, 7) the vertices of each loop, -1 after its end."""
     table, edge_corner, edge_axis = _table()
-    found = []
-    for triangle in range(_MOST_TRIANGLES):
-        more = table[case, triangle, 0] >= 0
+    found = [np.empty((0, _LONGEST_LOOP), np.int32)]
+    for loop in range(_MOST_LOOPS):
+        more = table[case, loop, 0] >= 0
         cells, case = cells[more], case[more]
-        edge = table[case, triangle]
+        edge = table[case, loop]
         corner = np.take_along_axis(cells, edge_corner[edge], axis=1)
-        found.append(vertex_of[corner, edge_axis[edge]])
+        found.append(np.where(edge >= 0, vertex_of[corner, edge_axis[edge]], -1))
     return np.concatenate(found)
 
 
@@ -149,23 +163,23 @@ def _used(faces: Int32, count: int) -> tuple[npt.NDArray[np.bool_], Int32]:
 
 @cache
 def _table() -> tuple[Int32, Int32, Int32]:
-    """(256, 5, 3) the edges that each triangle joins, by case, -1 for none; (12,) corner and axis.
+    """(256, 4, 7) the edges that each loop joins, by case, -1 for none; (12,) corner and axis.
 
     Case bit i says that corner i lies in front. Edges are directed segments on the cube's faces,
-    the front to the right as seen from outside, joined to loops and cut into fans.
+    the front to the right as seen from outside, joined to loops that begin where a fan may.
     """
     number = {edge: i for i, edge in enumerate(_EDGES)}
     sides = [
         {(axis, a >> axis & 1) for axis in range(3) if a >> axis & 1 == b >> axis & 1}
         for a, b in _EDGES
     ]
-    table = np.full((256, _MOST_TRIANGLES, 3), -1, np.int32)
+    table = np.full((256, _MOST_LOOPS, _LONGEST_LOOP), -1, np.int32)
     for case in range(1, 255):
         after: dict[int, int] = {}
         for face in _cube_faces():
             after |= _segments(face, case, number)
-        triangles = [triangle for loop in _loops(after) for triangle in _fan(loop, sides)]
-        table[case, : len(triangles)] = triangles
+        for slot, loop in enumerate(_loops(after)):
+            table[case, slot, : len(loop)] = _from_apex(loop, sides)
     first, second = np.array(_EDGES, np.int32).T
     return table, first, (second - first) // 2
 
@@ -204,13 +218,13 @@ def _loops(after: dict[int, int]) -> list[list[int]]:
     return loops
 
 
-def _fan(loop: list[int], sides: list[set[tuple[int, int]]]) -> list[tuple[int, int, int]]:
-    """Cut a loop into triangles without a diagonal on the cube's surface.
+def _from_apex(loop: list[int], sides: list[set[tuple[int, int]]]) -> list[int]:
+    """Turn a loop so that a fan from its first vertex has no diagonal on the cube's surface.
 
     The neighbouring cell could draw the same diagonal, and four faces would share it.
     """
     for turn in range(len(loop)):
         apex, *rest = loop[turn:] + loop[:turn]
         if not any(sides[apex] & sides[edge] for edge in rest[1:-1]):
-            return [(apex, b, c) for b, c in pairwise(rest)]
+            return [apex, *rest]
     raise AssertionError(loop)  # no loop of a cube is without such an apex

@@ -42,15 +42,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from tourgen.errors import StageError
 from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud
-from tourgen.stages.surface.growing import distinct, grown
+from tourgen.stages.surface.field import Field
+from tourgen.stages.surface.growing import grown
 from tourgen.stages.surface.marching_cubes import (
     Keys,
-    corner_of,
-    key_of,
     marching_cubes,
     most_cells,
 )
@@ -63,15 +61,8 @@ from tourgen.stages.surface.tangent_planes import (
 )
 
 VERSION = 1
-_CHUNK = 1 << 17
 _STEEPEST = 1.2
 """Most change of the distance over the way; a little more than 1 for the blend."""
-_ACROSS = 0.1
-"""Share of the weight across a crease from which on it is one."""
-_MARGIN = 0.2
-"""How far the grid goes on around the points, in their extent: a surface that closes gaps may."""
-_DENSEST, _SPARSEST = 0.5, 2.0
-"""The part of the room's spacing that a region's own counts for, at least and at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +170,15 @@ class Distances:
     def zero_set(self, origin: Float64) -> Mesh:
         """Where the distance is zero; no faces where it nowhere is."""
         low, cell_m = self.field.low, float(self.field.cell_m)
-        return marching_cubes(self.key, self.value, low, cell_m, origin, steepest=_STEEPEST)
+        return marching_cubes(
+            self.key,
+            self.value,
+            low,
+            cell_m,
+            origin,
+            steepest=_STEEPEST,
+            normals=self.field.normal,
+        )
 
     def carried_on(self, beyond: Beyond) -> Distances:
         """The same, and where it is unknown the distance to another surface."""
@@ -188,19 +187,34 @@ class Distances:
         value[unknown] = beyond.distance(self.field.places(self.key[unknown]))
 
         def told(key: Keys) -> Float32:
-            found = self.field(key)
+            found = self.field.distance(key)
             open_ = np.isnan(found)
             found[open_] = beyond.distance(self.field.places(key[open_]))
             return found
 
         seeds = np.concatenate([self.field.seeds, self.field.cells(beyond.seeds)])
-        return self.field.grown(told, seeds, self.key, value)
+        return _grown(self.field, told, seeds, self.key, value)
 
 
 def distances(planes: TangentPlanes, settings: Settings) -> Distances:
     """The distance to tangent planes, from the cells with points on."""
-    field = Field(planes, settings)
-    return field.grown(field, field.seeds, np.empty(0, np.int64), np.empty(0, np.float32))
+    field = Field(
+        planes,
+        settings.cell_m,
+        settings.spacing_m,
+        settings.reach,
+        settings.crease_deg,
+        settings.blend,
+    )
+    nothing = np.empty(0, np.int64), np.empty(0, np.float32)
+    return _grown(field, field.distance, field.seeds, *nothing)
+
+
+def _grown(
+    field: Field, told: Callable[[Keys], Float32], seeds: Keys, key: Keys, value: Float32
+) -> Distances:
+    most_m = float(np.sqrt(2) * _STEEPEST * field.cell_m)
+    return Distances(field, *grown(told, seeds, key, value, most_m))
 
 
 class Beyond(Protocol):
@@ -215,93 +229,3 @@ class Beyond(Protocol):
     def distance(self, places: Float32) -> Float32:
         """(n,) metres that each of (n, 3) places lies in front of it."""
         ...
-
-
-class Field:
-    """The distance at the corners of a grid.
-
-    Attributes:
-        low: (3,) float32, place of the corner (0, 0, 0), metres.
-        cell_m: Edge of a cell.
-        seeds: Keys of the cells with points.
-    """
-
-    def __init__(self, planes: TangentPlanes, settings: Settings) -> None:
-        spacing_m = np.clip(
-            planes.spacing_m, _DENSEST * settings.spacing_m, _SPARSEST * settings.spacing_m
-        )
-        self._planes = planes
-        self._reach_m = np.float32(settings.reach) * spacing_m + np.float32(planes.noise_m)
-        self._alike = np.float32(np.cos(np.radians(2 * settings.crease_deg)))
-        self._count = min(settings.blend + 1, len(planes.points))
-        self._tree = cKDTree(planes.points)
-        self.cell_m = np.float32(settings.cell_m)
-        low = planes.points.min(axis=0)
-        extent_m = np.float32((planes.points.max(axis=0) - low).max())
-        self.low = low - self._reach_m.max() - 2 * self.cell_m - np.float32(_MARGIN) * extent_m
-        self.seeds = self.cells(planes.points)
-
-    def places(self, key: Keys) -> Float32:
-        """(n, 3) of (n,) corners, metres."""
-        return np.asarray(corner_of(key).astype(np.float32) * self.cell_m + self.low)
-
-    def cells(self, places: Float32) -> Keys:
-        """Keys of the cells that hold places, each once."""
-        return distinct(key_of(((places - self.low) / self.cell_m).astype(np.int32)))
-
-    def grown(
-        self, told: Callable[[Keys], Float32], seeds: Keys, key: Keys, value: Float32
-    ) -> Distances:
-        """The distances that are ``told`` at all cells that the surface enters, from seeds on."""
-        most_m = float(np.sqrt(2) * _STEEPEST * self.cell_m)
-        return Distances(self, *grown(told, seeds, key, value, most_m))
-
-    def __call__(self, key: Keys) -> Float32:
-        """(n,) distances at (n,) corners, NaN where unknown."""
-        parts = [self._distance(key[at : at + _CHUNK]) for at in range(0, len(key), _CHUNK)]
-        return np.concatenate([np.empty(0, np.float32), *parts])
-
-    def _distance(self, key: Keys) -> Float32:
-        place = self.places(key)
-        rank = np.arange(1, self._count + 1)
-        distance, index = self._tree.query(place, k=rank, workers=-1)
-        away, near = np.asarray(distance, np.float32), np.asarray(index)
-        offset, normals = place[:, None] - self._planes.points[near], self._planes.normals[near]
-        height = np.einsum("ikj,ikj->ik", offset, normals)
-        reach_m = self._reach_m[near[:, 0]]
-        foot_m2 = np.square(away[:, 0]) - np.square(height[:, 0])
-        known = (foot_m2 < np.square(reach_m)) & (np.abs(height[:, 0]) < reach_m)
-        weight = np.square(1 - np.square(away / np.maximum(away[:, -1:], 1e-9)))
-        weight[:, 0] += np.float32(1e-6)  # all may be equally far
-        weight /= weight.sum(axis=1, keepdims=True)
-        blended = self._over_both_sides(self._planes.points[near], normals, offset, height, weight)
-        return np.where(known, blended, np.float32(np.nan))
-
-    def _over_both_sides(
-        self, points: Float32, normals: Float32, offset: Float32, height: Float32, weight: Float32
-    ) -> Float32:
-        """Distance to the planes like the nearest and to those across a crease from it.
-
-        In front of an edge or a thin wall a place is in front of one side, in a corner of both.
-        """
-        alike = np.einsum("ij,ikj->ik", normals[:, 0], normals) > self._alike
-        here = _over_round(weight * alike, normals, offset, height)
-        across = _over_round(weight * ~alike, normals, offset, height)
-        between = points - points[:, :1]
-        rise = np.einsum("ij,ikj->ik", normals[:, 0], between)
-        rise -= np.einsum("ikj,ikj->ik", normals, between)
-        edge = (weight * ~alike * rise).sum(axis=1) < 0
-        both = np.where(edge, np.maximum(here, across), np.minimum(here, across))
-        share = np.minimum((weight * ~alike).sum(axis=1) / np.float32(_ACROSS), 1)
-        return np.asarray(here + share * (both - here), np.float32)
-
-
-def _over_round(weight: Float32, normals: Float32, offset: Float32, height: Float32) -> Float32:
-    """Mean height over planes, along the middle between each plane's normal and their mean.
-
-    Planes that touch a sphere lie outside it; so taken, heights over them are those over it.
-    """
-    mean = np.einsum("ik,ikj->ij", weight, normals)
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-6)
-    middle = (height + np.einsum("ij,ikj->ik", mean, offset)) / 2
-    return np.asarray((weight * middle).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-9))
