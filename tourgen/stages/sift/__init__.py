@@ -21,12 +21,13 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.errors import InputError
-from tourgen.geometry import Float64, PointCloud
+from tourgen.geometry import Float32, Float64, PointCloud
+from tourgen.stages.sift.grown import bodies, grown
 from tourgen.stages.sift.mirrors import reflections
 from tourgen.stages.sift.mixed import mixed
 from tourgen.stages.sift.strays import clusters, islands, isolated
-from tourgen.stages.sift.through import confirmed, grown, passed
-from tourgen.stages.sift.views import views
+from tourgen.stages.sift.through import passed
+from tourgen.stages.sift.views import View, views
 
 VERSION = 1
 Mask = npt.NDArray[np.bool_]
@@ -41,7 +42,6 @@ class Settings:
         margin_m: How far behind a place a beam must end to have passed it.
         behind_m: What lies farther behind a mirror, on a beam through it, is a reflection.
         mixed_m: A mixed pixel this near to a surface may stay.
-        confirm_m: A point that another station measured within this stays.
         neighbours: Points that make a neighbourhood in space.
         isolation_ratio: A point is a stray when its mean distance to its neighbours exceeds
             theirs by this factor.
@@ -52,8 +52,7 @@ class Settings:
     min_points: int = 10_000
     margin_m: float = 0.02
     behind_m: float = 0.003
-    mixed_m: float = 0.006
-    confirm_m: float = 0.006
+    mixed_m: float = 0.010
     neighbours: int = 8
     isolation_ratio: float = 2.5
     island_gap_m: float = 0.15
@@ -86,16 +85,30 @@ def sift(cloud: PointCloud, stations: Float64, settings: Settings) -> Sifted:
         InputError: Fewer than ``min_points`` points, before or after.
     """
     _require(len(cloud), settings.min_points, "")
-    steps = {"reflected": _reflected, "passed": _passed, "mixed": _mixed, "strays": _strays}
-    rest = np.ones(len(cloud), np.bool_)
-    removed = {}
-    for cause, step in steps.items():
-        gone = step(cloud.take(rest), stations, settings)
-        rest[np.flatnonzero(rest)[gone]] = False
-        removed[cause] = int(gone.sum())
-    kept = cloud.take(rest)
-    _require(len(kept), settings.min_points, " after cleaning")
-    return Sifted(kept, removed)
+    left, reflected = _without(cloud, _reflected(cloud, stations, settings))
+    left, gone = _without(left, _passed(left, stations, settings))
+    seen = list(views(left, stations))
+    lonely = mixed(left.points, seen, settings.mixed_m)
+    rough = ~_smooth(len(left), seen)[~lonely]
+    left, spoiled = _without(left, lonely)
+    left, strays = _without(left, _strays(left.points, rough, settings))
+    _require(len(left), settings.min_points, " after cleaning")
+    return Sifted(
+        left,
+        {"reflected": reflected, "passed": gone, "mixed": spoiled, "strays": strays},
+    )
+
+
+def _without(cloud: PointCloud, gone: Mask) -> tuple[PointCloud, int]:
+    return cloud.take(~gone), int(gone.sum())
+
+
+def _smooth(count: int, seen: list[View]) -> Mask:
+    """Mask of the points that lie on a plane with all others around, in some view."""
+    found = np.zeros(count, np.bool_)
+    for view in seen:
+        found[view.index[view.smooth]] = True
+    return found
 
 
 def _reflected(cloud: PointCloud, stations: Float64, settings: Settings) -> Mask:
@@ -107,26 +120,20 @@ def _reflected(cloud: PointCloud, stations: Float64, settings: Settings) -> Mask
 
 def _passed(cloud: PointCloud, stations: Float64, settings: Settings) -> Mask:
     known = cloud.station >= 0
-    gone = np.zeros(len(cloud), np.bool_)
+    gone, body = np.zeros((2, len(cloud)), np.bool_)
     if len(stations) > 1 and known.any():
         told = cloud.take(known)
-        gone[known] = passed(told, list(views(told, stations)), settings.margin_m)
-        gone = grown(cloud, gone)
-    return gone
+        seen = list(views(told, stations))
+        found = passed(told.points, seen, settings.margin_m)
+        gone[known], body[known] = found, bodies(told.points, found, seen)
+    return grown(cloud, gone, body)
 
 
-def _mixed(cloud: PointCloud, stations: Float64, settings: Settings) -> Mask:
-    found = mixed(len(cloud), views(cloud, stations), settings.mixed_m)
-    at = np.flatnonzero(found)
-    every = np.ones(len(cloud), np.bool_)
-    found[at[confirmed(cloud, at, every, settings.confirm_m)]] = False
-    return found
-
-
-def _strays(cloud: PointCloud, _: Float64, settings: Settings) -> Mask:
-    gone = islands(cloud.points, settings.island_gap_m, settings.island_share)
+def _strays(points: Float32, suspect: Mask, settings: Settings) -> Mask:
+    gone = islands(points, settings.island_gap_m, settings.island_share)
     rest = np.flatnonzero(~gone)
-    alone = isolated(cloud.points[rest], settings.neighbours, settings.isolation_ratio)
+    suspect = suspect[rest]
+    alone = isolated(points[rest], suspect, settings.neighbours, settings.isolation_ratio)
     gone[rest[alone]] = True
     return gone
 

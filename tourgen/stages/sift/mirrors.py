@@ -65,7 +65,10 @@ class Mirror:
 
 
 def reflections(
-    points: Float32, cluster: npt.NDArray[np.int32], seen: Sequence[View], behind_m: float
+    points: Float32,
+    cluster: npt.NDArray[np.int32],
+    seen: Sequence[View],
+    behind_m: float,
 ) -> Mask:
     """Mask of the points that lie behind mirrors.
 
@@ -115,7 +118,7 @@ def _apart(
 
 def _frame(view: View, at: npt.NDArray[np.int64], of_room: Mask) -> npt.NDArray[np.int64]:
     """The points of the room next to others in a picture, and nearer to the station."""
-    near = np.unique(view.neighbours(at, _FRAME))
+    near = np.unique(view.around(at, _FRAME).neighbours(at, _FRAME))
     return near[of_room[view.index[near]] & (view.range_m[near] < np.median(view.range_m[at]))]
 
 

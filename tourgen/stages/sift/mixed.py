@@ -15,9 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.geometry import Float32
+from tourgen.stages.sift.rejoin import rejoined
 from tourgen.stages.sift.views import View
 
 Mask = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.floating]
 Places = tuple[Float32, Float32, Float32]
 _RING = 8
@@ -33,70 +35,55 @@ _SUSPECT_SIGMA = 2.5
 _PLANE_SIGMA = 1.2
 _OWN_SIGMA = 2.5
 _BETWEEN_SIGMA = 3.0
-_SAMPLE = 50_000
+_NEAR_M = 0.006
 
 
-def mixed(count: int, seen: Iterable[View], near_m: float) -> Mask:
-    """Mask of the ``count`` points that have no company in any view they are in."""
-    alone, company = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+def mixed(points: Float32, seen: Iterable[View], near_m: float) -> Mask:
+    """Mask of the (n, 3) points that have no company in any view they are in, nor in space."""
+    alone, company = np.zeros((2, len(points)), np.bool_)
+    way = np.zeros((len(points), 3), np.float32)
+    spacing_m, noise_m = np.zeros((2, len(points)), np.float32)
     for view in seen:
-        if len(view) <= _NEAR:
-            continue
-        noise_m = _noise_m(view)
-        suspect = np.concatenate(
-            [at[_bent(view, at, noise_m[at])] for at in view.blocks(np.arange(len(view)))]
-        )
         lonely = np.zeros(len(view), np.bool_)
-        for at in view.blocks(suspect):
-            between = at[_between(view, at, noise_m[at])]
-            lonely[between] = ~_in_company(view, between, noise_m[between], near_m)
-        alone[view.index[lonely]] = True
+        suspect = np.flatnonzero(~view.smooth)
+        if len(view) > _NEAR and len(suspect):
+            around = view.around(suspect, _NEAR)
+            for at in view.blocks(suspect):
+                near = around.neighbours(at, _NEAR)
+                edge = _bent(view, at, near) & _between(view, at, near)
+                lonely[at[edge]] = ~_in_company(view, at[edge], near[edge])
+        at = view.index[lonely]
+        alone[at] = True
         company[view.index[~lonely]] = True
-    return alone & ~company
+        way[at], noise_m[at] = view.direction[lonely], view.noise_m[lonely]
+        spacing_m[at] = view.range_m[lonely] * view.picture.step_rad
+    found = alone & ~company
+    back = rejoined(points, found, way[found], spacing_m[found], noise_m[found], near_m)
+    found[np.flatnonzero(found)[back]] = False
+    return found
 
 
-def _residual_m(view: View, at: npt.NDArray[np.int64]) -> Float32:
-    """How far each point lies off the mean of its ring, along the beam."""
-    around = (1 / view.range_m)[view.neighbours(at, _RING)].mean(axis=1)
+def _bent(view: View, at: Indices, near: Indices) -> Mask:
+    """Whether a point lies off the mean of its ring, along the beam."""
+    around = (1 / view.range_m)[near[:, :_RING]].mean(axis=1)
     own = view.range_m[at]
-    return np.asarray(np.abs(around - 1 / own) * own * own, np.float32)
+    return np.asarray(np.abs(around - 1 / own) * own * own > _SUSPECT_SIGMA * view.noise_m[at])
 
 
-def _bent(view: View, at: npt.NDArray[np.int64], noise_m: Float32) -> Mask:
-    return np.asarray(_residual_m(view, at) > _SUSPECT_SIGMA * noise_m)
-
-
-def _between(view: View, at: npt.NDArray[np.int64], noise_m: Float32) -> Mask:
+def _between(view: View, at: Indices, near: Indices) -> Mask:
     """Whether a point lies well behind one of its ring and well before another."""
-    ring, own = view.range_m[view.neighbours(at, _RING)], view.range_m[at]
-    before = own - ring.min(axis=1) > _BETWEEN_SIGMA * noise_m
-    return np.asarray(before & (ring.max(axis=1) - own > _BETWEEN_SIGMA * noise_m))
+    ring, own = view.range_m[near[:, :_RING]], view.range_m[at]
+    least = _BETWEEN_SIGMA * view.noise_m[at]
+    return np.asarray((own - ring.min(axis=1) > least) & (ring.max(axis=1) - own > least))
 
 
-def _noise_m(view: View) -> Float32:
-    """Range noise at each point, from what smooth surfaces show at such a range.
-
-    The lower quartile of the residuals is that of smooth places, whatever the furniture; of a
-    normal distribution it is 0.32 standard deviations.
-    """
-    rng = np.random.default_rng(0)
-    sample = rng.choice(len(view), min(_SAMPLE, len(view)), replace=False)
-    residual = _residual_m(view, sample)
-    order = np.argsort(view.range_m[sample])
-    groups = np.array_split(order, max(1, len(order) // 2000))
-    middle = [float(np.median(view.range_m[sample[each]])) for each in groups]
-    noise = [float(np.quantile(residual[each], 0.25)) / 0.32 for each in groups]
-    lowest = 1e-6 * float(np.median(view.range_m))  # float32
-    return np.maximum(np.interp(view.range_m, middle, noise), lowest).astype(np.float32)
-
-
-def _in_company(view: View, at: npt.NDArray[np.int64], noise_m: Float32, near_m: float) -> Mask:
-    places = _picture(view, at, view.neighbours(at, _NEAR))
+def _in_company(view: View, at: Indices, near: Indices) -> Mask:
+    places = _picture(view, at, near)
     u, v, inverse = places
     own = view.range_m[at]
     radius = np.hypot(u, v)
     reach = radius / np.maximum(radius[:, :_RING].mean(axis=1, keepdims=True), 1e-9)
-    error = noise_m / (own * own)
+    error = view.noise_m[at] / (own * own)
     tolerance = _PLANE_SIGMA * error[:, None] * (1 + reach)
     company = _on_line(places, own, tolerance)
     for corners in _triples(places):
@@ -108,10 +95,8 @@ def _in_company(view: View, at: npt.NDArray[np.int64], noise_m: Float32, near_m:
         check = np.flatnonzero(wide & enough & ~company)
         if len(check):
             off, spread = _own_place(friends[check], u[check], v[check], inverse[check])
-            square = own[check] ** 2
-            off_m = off * square / np.hypot(1, slope[check])
-            spread *= _OWN_SIGMA * error[check]
-            company[check] = (off < spread) | (off_m < near_m)
+            off_m = off * own[check] ** 2 / np.hypot(1, slope[check])
+            company[check] = (off < spread * _OWN_SIGMA * error[check]) | (off_m < _NEAR_M)
     return company
 
 
@@ -179,7 +164,7 @@ def _own_place(friends: Mask, u: Float32, v: Float32, inverse: Float32) -> tuple
     )
 
 
-def _picture(view: View, at: npt.NDArray[np.int64], near: npt.NDArray[np.int64]) -> Places:
+def _picture(view: View, at: Indices, near: Indices) -> Places:
     """Neighbours in the picture plane about each point: place (u, v), and inverse depth less the
     point's own."""
     axis = view.direction[at]

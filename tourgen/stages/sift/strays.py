@@ -14,37 +14,52 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from tourgen.geometry import Float32, Int32
 from tourgen.stages.mesh_arrays import components
 
 Mask = npt.NDArray[np.bool_]
 _BLOCK = 500_000
+_SPOT_M = 1e-4
+_CRUMB = 60
+"""Fewest points that are a thing of their own."""
 
 
-def isolated(points: Float32, neighbours: int, ratio: float) -> Mask:
+def isolated(points: Float32, suspect: Mask, neighbours: int, ratio: float) -> Mask:
     """Mask of the (n, 3) points that are ``ratio`` times as far from theirs as these from others.
 
-    Places with more than ``neighbours`` points in one spot count as dense, not as strays.
+    Only those of the (n,) ``suspect`` are asked. Places with more than ``neighbours`` points in
+    one spot count as dense, not as strays.
     """
-    tree, nearest = cKDTree(points), np.arange(2, neighbours + 2)  # the first is the point itself
-    nearest = nearest[nearest <= len(points)]
-    if not len(nearest):
-        return np.zeros(len(points), np.bool_)
-    own = np.empty(len(points), np.float32)
-    for start in range(0, len(points), _BLOCK):
-        part = slice(start, start + _BLOCK)
-        distance, _ = tree.query(points[part], k=nearest, workers=-1)
-        own[part] = np.asarray(distance).mean(axis=1)
-    # Only what is farther from its neighbours than most points can be a stray.
-    suspect = np.flatnonzero(own > ratio * max(float(np.quantile(own, 0.1)), 1e-4))
     found = np.zeros(len(points), np.bool_)
-    for start in range(0, len(suspect), _BLOCK):
-        at = suspect[start : start + _BLOCK]
-        _, index = tree.query(points[at], k=nearest, workers=-1)
-        found[at] = own[at] > ratio * np.maximum(np.median(own[index], axis=1), 1e-4)
+    asked = np.flatnonzero(suspect)
+    count = min(neighbours, len(points) - 1)
+    if not len(asked) or count < 1:
+        return found
+    tree = cKDTree(points)
+    own, near = _around(tree, points, asked, count)
+    # Only what is farther from its neighbours than most points can be a stray.
+    far = own > ratio * max(float(np.quantile(own, 0.1)), _SPOT_M)
+    asked, own, near = asked[far], own[far], near[far]
+    others, inverse = np.unique(near, return_inverse=True)
+    theirs = _around(tree, points, others, count)[0][inverse].reshape(near.shape)
+    found[asked] = own > ratio * np.maximum(np.median(theirs, axis=1), _SPOT_M)
     return found
+
+
+def _around(
+    tree: cKDTree, points: Float32, at: npt.NDArray[np.signedinteger], count: int
+) -> tuple[Float32, Int32]:
+    """Mean distance of the points ``at`` to their neighbours, and which these are."""
+    distance_m = np.empty(len(at), np.float32)
+    near = np.empty((len(at), count), np.int32)
+    nearest = np.arange(2, count + 2)  # the first is the point itself
+    for start in range(0, len(at), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        distance, near[part] = tree.query(points[at[part]], k=nearest, workers=-1)
+        distance_m[part] = np.asarray(distance).mean(axis=1)
+    return distance_m, near
 
 
 def clusters(points: Float32, gap_m: float) -> Int32:
@@ -59,9 +74,30 @@ def clusters(points: Float32, gap_m: float) -> Int32:
 
 
 def islands(points: Float32, gap_m: float, share: float) -> Mask:
-    """Mask of the (n, 3) points in clusters of less than ``share`` of all, ``gap_m`` apart."""
+    """Mask of the (n, 3) points in clusters of less than ``share`` of all, ``gap_m`` apart.
+
+    Of those that the room surrounds only crumbs: a lamp may hang on a wire that no beam meets.
+    """
     cluster = clusters(points, gap_m)
-    return np.asarray((np.bincount(cluster) < share * len(points))[cluster])
+    size = np.bincount(cluster)
+    small = size < share * len(points)
+    few = np.flatnonzero(small[cluster])
+    if not len(few):
+        return np.zeros(len(points), np.bool_)
+    outside = ~_within(points[few], points[cluster == 0], gap_m)
+    beyond = np.bincount(cluster[few], outside, minlength=len(size)) > 0
+    return np.asarray((small & (beyond | (size < _CRUMB)))[cluster])
+
+
+def _within(points: Float32, room: Float32, edge_m: float) -> Mask:
+    """Mask of the (n, 3) points that a room surrounds: within its convex hull."""
+    low = room.min(axis=0)
+    cells, _, _ = _occupied(room, edge_m)
+    try:
+        outline = ConvexHull((cells + 0.5) * edge_m).equations
+    except (QhullError, ValueError):
+        return np.zeros(len(points), np.bool_)
+    return np.asarray(((points - low) @ outline[:, :3].T + outline[:, 3] < 0).all(axis=1))
 
 
 def _occupied(
