@@ -22,6 +22,7 @@ from tourgen.stages import (
     exposure,
     floor,
     hygiene,
+    inferred,
     levels,
     measure,
     normals,
@@ -230,11 +231,21 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         version=bake.VERSION,
         libraries=("open3d", "scipy"),
     )
+    guessed = task(
+        "inferred",
+        picture.guessed,
+        unwrapped,
+        cleaned,
+        spaced,
+        version=inferred.VERSION,
+        libraries=("scipy",),
+    )
     files = task(
         "pack",
         picture.packed,
         tree,
         baked,
+        guessed,
         settings=picture.Packing(room.texture.quality),
         version=pack.VERSION,
         libraries=("DracoPy", "pygltflib", "pillow"),

@@ -26,6 +26,11 @@ def textured(some: Mesh) -> TexturedMesh:
     return TexturedMesh(tile, picture)
 
 
+def measured(tile: TexturedMesh) -> np.ndarray:
+    """Nothing of it is a guess."""
+    return np.zeros(len(tile.uv_mesh.mesh.vertices), np.uint8)
+
+
 def parts(glb: bytes) -> tuple[dict, bytes]:
     magic, version, length = struct.unpack("<4sII", glb[:12])
     assert (magic, version, length) == (b"glTF", 2, len(glb))
@@ -58,7 +63,7 @@ def z_up(points: np.ndarray) -> np.ndarray:
 def test_what_is_unpacked_lies_within_half_a_step_of_what_was_packed() -> None:
     tile = textured(box_room(2.3, 8, 0.01))
     place = grid(tile.uv_mesh.mesh.vertices)
-    result = decoded(pack(tile, Settings(place)))
+    result = decoded(pack(tile, measured(tile), Settings(place)))
     source = tile.uv_mesh.mesh
     assert len(result.faces) == len(source.faces)
 
@@ -104,7 +109,8 @@ def test_vertices_that_two_tiles_share_decode_to_the_same_bits(
     for tile in tiles:
         uv = rng.random((60, 2)).astype(np.float32)
         plain = UvMesh(tile, uv, np.zeros(50, np.int32), (8, 8), 0.05)
-        packed = pack(TexturedMesh(plain, np.zeros((8, 8, 3), np.uint8)), Settings(place))
+        made = TexturedMesh(plain, np.zeros((8, 8, 3), np.uint8))
+        packed = pack(made, measured(made), Settings(place))
         found.append({point.tobytes(): point for point in decoded(packed).points})
     common = np.array([found[0][bits] for bits in found[0].keys() & found[1].keys()])
     expected = np.rint(shared.astype(np.float32).astype(float) / STEP_M) * STEP_M
@@ -114,7 +120,7 @@ def test_vertices_that_two_tiles_share_decode_to_the_same_bits(
 
 def test_the_document_says_what_the_buffers_hold() -> None:
     tile = textured(box_room(1.5, 6, 0.01))
-    glb = pack(tile, Settings(grid(tile.uv_mesh.mesh.vertices)))
+    glb = pack(tile, measured(tile), Settings(grid(tile.uv_mesh.mesh.vertices)))
     document, binary = parts(glb)
     result = decoded(glb)
     primitive = document["meshes"][0]["primitives"][0]
@@ -147,9 +153,26 @@ def test_the_document_says_what_the_buffers_hold() -> None:
     assert off.mean() < 4
 
 
+def test_each_vertex_tells_whether_it_is_a_guess() -> None:
+    tile = textured(sheet(1.0, 0.5, 12))
+    vertices = tile.uv_mesh.mesh.vertices
+    guess = np.where(vertices[:, 0] > 0.6, 255, 0).astype(np.uint8)
+    glb = pack(tile, guess, Settings(grid(vertices)))
+    document, _ = parts(glb)
+    primitive = document["meshes"][0]["primitives"][0]
+    accessor = document["accessors"][primitive["attributes"]["_INFERRED"]]
+    assert (accessor["type"], accessor["componentType"]) == ("SCALAR", 5121)
+    assert accessor["normalized"]
+    number = primitive["extensions"]["KHR_draco_mesh_compression"]["attributes"]["_INFERRED"]
+    result = decoded(glb)
+    told = next(each["data"] for each in result.attributes if each["unique_id"] == number)
+    np.testing.assert_array_equal(told.ravel() == 255, result.points[:, 0] > 0.6)
+    assert 0 < (told == 255).mean() < 1
+
+
 def test_up_is_y_in_the_file() -> None:
     tile = textured(sheet(1.0, 0.5, 2))
-    points = decoded(pack(tile, Settings(grid(tile.uv_mesh.mesh.vertices)))).points
+    points = decoded(pack(tile, measured(tile), Settings(grid(tile.uv_mesh.mesh.vertices)))).points
     assert np.ptp(points, axis=0) == pytest.approx([1.0, 0.0, 0.5], abs=STEP_M)
     assert points[:, 2].max() == pytest.approx(0, abs=1e-6)
 
@@ -159,7 +182,7 @@ def test_faces_smaller_than_a_step_are_left_out() -> None:
     vertices = np.concatenate([plane.vertices, plane.vertices[:1] + 1e-5])
     speck = mesh(vertices, np.concatenate([plane.faces, [[0, len(plane.vertices), 1]]]))
     tile = textured(speck)
-    result = decoded(pack(tile, Settings(grid(vertices))))
+    result = decoded(pack(tile, measured(tile), Settings(grid(vertices))))
     assert len(result.faces) == len(plane.faces)
 
 
@@ -167,13 +190,13 @@ def test_a_vertex_off_the_grid_is_an_error() -> None:
     tile = textured(sheet(1.0, 1.0, 2))
     place = grid(tile.uv_mesh.mesh.vertices[:2])
     with pytest.raises(StageError, match="expected vertices within"):
-        pack(tile, Settings(place))
+        pack(tile, measured(tile), Settings(place))
 
 
 def test_nothing_but_specks_is_an_error() -> None:
     tile = textured(mesh([[0, 0, 0], [1e-5, 0, 0], [0, 1e-5, 0]], [[0, 1, 2]]))
     with pytest.raises(StageError, match=r"larger than 0\.25 mm"):
-        pack(tile, Settings(grid(tile.uv_mesh.mesh.vertices)))
+        pack(tile, measured(tile), Settings(grid(tile.uv_mesh.mesh.vertices)))
 
 
 def test_a_room_of_many_kilometres_is_an_error() -> None:

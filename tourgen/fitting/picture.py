@@ -9,14 +9,23 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tourgen.fitting.lengths import Corner
+from tourgen.fitting.lengths import Corner, support_m
 from tourgen.fitting.points import RoomScan, moved
 from tourgen.fitting.surface import Drawn
-from tourgen.geometry import Float64, OrientedCloud, PointCloud, TexturedMesh, Tile, UvMesh, View
+from tourgen.geometry import (
+    Float64,
+    OrientedCloud,
+    PointCloud,
+    TexturedMesh,
+    Tile,
+    UInt8,
+    UvMesh,
+    View,
+)
 from tourgen.scans import ReadFacts
-from tourgen.stages import bake, entry, levels, pack, poster, register, sift, unwrap
+from tourgen.stages import bake, entry, inferred, levels, pack, poster, register, sift, unwrap
 from tourgen.stages.mesh_arrays import face_areas
-from tourgen.stages.spacing import spacing_at
+from tourgen.stages.spacing import Spacing, spacing_at
 from tourgen.tileset import tileset_json
 from tourgen.tour import Viewpoint
 
@@ -132,15 +141,26 @@ def baked(
     return tuple(bake.bake(each, index, settings, vistas) for each in unwrapped_tiles)
 
 
+def guessed(
+    unwrapped_tiles: tuple[UvMesh, ...], cloud: PointCloud, spacing: Spacing
+) -> tuple[UInt8, ...]:
+    """Which vertices of each tile no measurement stands behind."""
+    vertices = tuple(each.mesh.vertices for each in unwrapped_tiles)
+    return inferred.inferred(vertices, cloud, inferred.Settings(support_m(spacing)))
+
+
 def packed(
-    room: tuple[Tile, ...], textured: tuple[TexturedMesh, ...], asked: Packing
+    room: tuple[Tile, ...],
+    textured: tuple[TexturedMesh, ...],
+    guessed: tuple[UInt8, ...],
+    asked: Packing,
 ) -> Mapping[str, bytes]:
     """Pack all tiles on one quantisation grid, and write the tileset."""
     vertices = np.concatenate([tile.mesh.vertices for tile in room])
     settings = pack.Settings(grid=pack.grid(vertices), quality=asked.quality)
     files = {
-        f"tiles/{tile.id}.glb": pack.pack(each, settings)
-        for tile, each in zip(room, textured, strict=True)
+        f"tiles/{tile.id}.glb": pack.pack(each, guess, settings)
+        for tile, each, guess in zip(room, textured, guessed, strict=True)
     }
     return {"tileset.json": tileset_json(room), **files}
 

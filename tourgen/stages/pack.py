@@ -20,14 +20,15 @@ from tourgen import __version__
 from tourgen.errors import StageError
 
 if TYPE_CHECKING:
-    from tourgen.geometry import Float32, Float64, Int32, TexturedMesh, UInt8
+    from tourgen.geometry import Float32, Float64, Int32, TexturedMesh, UInt8, UvMesh
 
-VERSION = 2
+VERSION = 3
 
 STEP_M = 2.0**-12
 _MOST_BITS = 24  # a float32 holds no more
 _TEXELS_OF_STEP = 0.25
-_UNSIGNED_INT, _FLOAT = 5125, 5126
+_UNSIGNED_BYTE, _UNSIGNED_INT, _FLOAT = 5121, 5125, 5126
+_INFERRED = "_INFERRED"
 _LINEAR, _LINEAR_MIPMAP_LINEAR, _CLAMP_TO_EDGE = 9729, 9987, 33071
 
 
@@ -88,11 +89,13 @@ def grid(vertices: Float32) -> Grid:
     return Grid((float(origin[0]), float(origin[1]), float(origin[2])), bits)
 
 
-def pack(textured: TexturedMesh, settings: Settings) -> bytes:
+def pack(textured: TexturedMesh, inferred: UInt8, settings: Settings) -> bytes:
     """A tile as the bytes of a .glb file.
 
     Args:
         textured: The tile.
+        inferred: (v,) 255 for its vertices that are a guess, 0 for those that were measured; in
+            the file the attribute ``_INFERRED``, from 0 to 1.
         settings: See there.
 
     Returns:
@@ -112,7 +115,7 @@ def pack(textured: TexturedMesh, settings: Settings) -> bytes:
     faces = _with_area(positions, mesh.faces)
     if not len(faces):
         raise StageError("pack: expected a face larger than 0.25 mm, found none")
-    geometry = _draco(positions.astype(np.float32), textured.uv_mesh.uv, faces, textured, settings)
+    geometry = _draco(positions.astype(np.float32), faces, textured.uv_mesh, inferred, settings)
     return _glb(geometry, _webp(textured.texture, settings))
 
 
@@ -136,13 +139,13 @@ class _Geometry:
 
 
 def _draco(
-    positions: Float32, uv: Float32, faces: Int32, textured: TexturedMesh, settings: Settings
+    positions: Float32, faces: Int32, uv_mesh: UvMesh, inferred: UInt8, settings: Settings
 ) -> _Geometry:
     import DracoPy
 
     grid = settings.grid
     x, y, z = grid.origin
-    texels = max(textured.uv_mesh.texture_size)
+    texels = max(uv_mesh.texture_size)
     used, renumbered = np.unique(faces, return_inverse=True)
     data = DracoPy.encode(
         _y_up(positions[used]),
@@ -151,8 +154,9 @@ def _draco(
         compression_level=settings.draco_level,
         quantization_range=grid.range_m,
         quantization_origin=np.array([x, z, -(y + grid.range_m)], np.float32),
-        tex_coord=uv[used].astype(np.float64),  # DracoPy takes no other
+        tex_coord=uv_mesh.uv[used].astype(np.float64),  # DracoPy takes no other
         tex_coord_quantization_bits=int(np.ceil(np.log2(texels / _TEXELS_OF_STEP))),
+        generic_attributes={_INFERRED: inferred[used][:, None]},
     )
     decoded = DracoPy.decode(data)
     ids = {one["attribute_type"]: one["unique_id"] for one in decoded.attributes}
@@ -161,6 +165,7 @@ def _draco(
         {
             "POSITION": ids[DracoPy.AttributeType.POSITION],
             "TEXCOORD_0": ids[DracoPy.AttributeType.TEX_COORD],
+            _INFERRED: ids[DracoPy.AttributeType.GENERIC],
         },
         decoded.faces.size,
         len(decoded.points),
@@ -206,7 +211,7 @@ def _glb(geometry: _Geometry, webp: bytes) -> bytes:
             gltf.Mesh(
                 primitives=[
                     gltf.Primitive(
-                        attributes=gltf.Attributes(POSITION=1, TEXCOORD_0=2),
+                        attributes=gltf.Attributes(POSITION=1, TEXCOORD_0=2, **{_INFERRED: 3}),
                         indices=0,
                         material=0,
                         extensions={draco: {"bufferView": 0, "attributes": geometry.attributes}},
@@ -240,6 +245,7 @@ def _glb(geometry: _Geometry, webp: bytes) -> bytes:
             accessor("SCALAR", _UNSIGNED_INT, geometry.indices),
             accessor("VEC3", _FLOAT, geometry.vertices, min=geometry.low, max=geometry.high),
             accessor("VEC2", _FLOAT, geometry.vertices),
+            accessor("SCALAR", _UNSIGNED_BYTE, geometry.vertices, normalized=True),
         ],
         bufferViews=[
             gltf.BufferView(buffer=0, byteLength=len(geometry.data)),
