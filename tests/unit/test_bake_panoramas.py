@@ -13,7 +13,7 @@ from tourgen.geometry import Mesh, Panorama, TexturedMesh, UvMesh
 from tourgen.raster import rasterize
 from tourgen.stages import unwrap
 from tourgen.stages.bake import Settings, VistaSettings, bake, color_index, vistas
-from tourgen.stages.bake.pictures import agreed
+from tourgen.stages.bake.pictures import agreement
 from tourgen.stages.bake.vista import Vista, directions
 
 TEXEL_M = 0.01
@@ -166,9 +166,26 @@ def test_points_without_colour_leave_it_to_the_pictures() -> None:
 
 def test_agreement_drops_the_one_that_differs() -> None:
     shown = np.array([[[100.0] * 3], [[104.0] * 3], [[240.0] * 3]], np.float32)
-    equal = np.ones((3, 1), np.float32)
-    blend = agreed(shown, equal, equal)
-    assert blend[0] == pytest.approx([102] * 3, abs=1)
+    trust = agreement(shown, np.ones((3, 1), np.float32))[:, 0]
+    assert trust[:2].min() > 0.99
+    assert trust[2] < 0.01
+
+
+def test_stripes_finer_than_any_one_picture_s_pixels_come_from_all_together() -> None:
+    """Pixels of 9 to 15 mm, stripes of 14 mm: the pictures' pixels lie between one another's."""
+
+    def fine(places: np.ndarray) -> np.ndarray:
+        return painted(places) + np.where((places[:, :1] // 0.014) % 2 == 0, 30.0, -20.0)
+
+    eyes = ((0.2, 0.3, 2.0), (0.8, 0.3, 2.1), (0.5, 0.8, 2.2), (0.4, 0.5, 2.3), (0.7, 0.6, 2.4))
+    off = []
+    for several in (eyes[:1], eyes):
+        index, shown = ready([photo(lens, fine) for lens in several], fine)
+        places, colors = baked(index, shown, 0.004)
+        inner = (np.abs(places[:, :2] - 0.5) < 0.4).all(1)
+        inner &= np.abs(places[:, 0] % 0.014 - 0.007) < 0.004
+        off.append(np.sqrt(np.mean((colors[inner] - fine(places[inner])) ** 2)))
+    assert off[1] < 0.75 * off[0]
 
 
 def test_no_panoramas_make_no_vistas() -> None:

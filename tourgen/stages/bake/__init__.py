@@ -34,7 +34,7 @@ __all__ = [
     "vistas",
 ]
 
-VERSION = 2
+VERSION = 3
 
 
 def bake(
@@ -57,8 +57,8 @@ def bake(
     if vistas:
         colors = of_pictures(texels, vistas, index, uv_mesh.texel_m, settings)
     else:
-        every = np.arange(len(texels.row))
-        colors = of_points(texels, every, index, uv_mesh.texel_m, settings)
+        alone = np.zeros(len(texels.row), np.float32)
+        colors = of_points(texels, index, uv_mesh.texel_m, settings, alone).colors
     picture = np.zeros((height, width, 3), np.float32)
     covered = np.zeros((height, width), np.float32)
     picture[texels.row, texels.column] = colors

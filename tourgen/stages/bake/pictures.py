@@ -1,15 +1,22 @@
-"""The colours that panoramas and points show at texels, agreed upon between them.
+"""The colours that panoramas and points show at texels, as samples of one surface.
 
-Each picture that sees a texel gives a colour, a trust, and how near its pixels lie; the points
-give a colour too. The one of median brightness, weighted by trust, is what most of the evidence
-says; what is far from it, a passer-by, a highlight, a surface beside the right one, loses its
-weight, and the others are blended, the nearest pixels most.
+A pixel is a sample as a point is: pixels of several pictures lie between one another's and between
+the points, so that all together tell finer detail than the finest alone. All are blended by one
+bell as narrow as their joint density allows, each weighted by its distance along the surface.
 
-Tried and rejected, over a tenth of the demo's first chamber, means of squares of 5 mm held
-against the truth: pictures as so many more points, 24.9 dB against 27.3 dB; the nearest picture
-alone, 26.3; pixels blended across without regard to distance, 27.1; points only where pictures
-fail, 27.0, and on the stair 27.0 against 29.0, since a hair's breadth of pose decides what a pixel
-beside an edge shows.
+What a source shows is believed as far as it agrees, in means of 60 mm, with the one of median
+brightness, weighted by trust: a passer-by, a highlight, a surface beside the right one lose their
+weight. Means are compared since samples differ beside any edge, and rightly.
+
+PSNR over 15,000 pixels of ten views of the demo's first chamber where the surface stands right,
+kernels evaluated without texels between: points alone 23.96 dB; the blend before this one, in which
+the nearest pixels ruled and single samples had to agree, 24.99; all samples in one blend 26.24; the
+same without asking for agreement 26.02; agreement in means of 30 mm 25.54, of 150 mm 26.25. With
+the truth's own colours at the same places it is 26.5: what JPEG and poses cost. Weighting pixels
+bilinearly as well costs 0.16. Pictures without points 23.6.
+
+Tried and rejected, means of squares of 5 mm held against the truth: the nearest picture alone, 1 dB
+less than the blend before this one; points only where pictures fail, 0.3 to 2 dB less.
 """
 
 from __future__ import annotations
@@ -22,10 +29,10 @@ from tourgen.stages.bake.texels import Texels
 from tourgen.stages.bake.vista import Vista
 
 _TEXELS_AT_ONCE = 100_000
-_POINTS_WEIGHT = 0.8
-_APART = 16.0  # of 255
-_SIGMA_OF_PIXEL = 0.5  # of the nearest picture's, on the surface
-_SIGMA_OF_TEXEL = 0.4
+_POINTS_VOTE = 0.8
+_APART = 20.0  # of 255
+_TOLD_M = 0.06  # edge of the means in which sources are compared
+_LEAST = 1e-6  # weight of the points where nothing tells
 
 
 def of_pictures(
@@ -36,60 +43,71 @@ def of_pictures(
     settings: Settings,
 ) -> Float32:
     """(t, 3) colours of all texels."""
-    colors = of_points(texels, np.arange(len(texels.row)), index, texel_m, settings)
-    for start in range(0, len(texels.row), _TEXELS_AT_ONCE):
+    colors = np.empty((len(texels.row), 3), np.float32)
+    trust = believed(texels, vistas, index, settings)
+    for start in range(0, len(colors), _TEXELS_AT_ONCE):
         part = slice(start, start + _TEXELS_AT_ONCE)
-        shown, vote, near = _shown(texels, part, vistas, texel_m)
-        if len(shown):
-            points = np.full((1, shown.shape[1]), _POINTS_WEIGHT, np.float32)
-            shown = np.concatenate([shown, colors[None, part]])
-            vote, weight = (np.concatenate([each, points]) for each in (vote, vote * near))
-            colors[part] = agreed(shown, vote, weight)
+        some = texels.part(part)
+        colors[part] = _blended(some, trust[:, some.block], vistas, index, texel_m, settings)
     return colors
 
 
-def _shown(
-    texels: Texels, which: slice, vistas: tuple[Vista, ...], texel_m: float
-) -> tuple[Float32, Float32, Float32]:
-    """What the v pictures that show any of n texels tell.
-
-    Returns:
-        (v, n, 3) colours, (v, n) trust, (v, n) how near the pixels lie, 1 for the nearest.
-    """
-    places, normals = texels.positions[which], texels.normals[texels.block[which]]
-    looked = [(each, each.look(places, normals)) for each in vistas]
-    looked = [(each, sight) for each, sight in looked if len(sight.which)]
-    finest = np.full(len(places), np.inf, np.float32)
-    for _, sight in looked:
-        finest[sight.which] = np.minimum(finest[sight.which], sight.pixel_m)
-    sigma_m = np.maximum(_SIGMA_OF_PIXEL * finest, np.float32(_SIGMA_OF_TEXEL * texel_m))
-    colors = np.zeros((len(looked), len(places), 3), np.float32)
-    near = np.zeros((len(looked), len(places)), np.float32)
-    trust = np.zeros_like(near)
-    for number, (each, sight) in enumerate(looked):
+def _blended(
+    texels: Texels,
+    trust: Float32,
+    vistas: tuple[Vista, ...],
+    index: ColorIndex,
+    texel_m: float,
+    settings: Settings,
+) -> Float32:
+    """(n, 3) colours of n texels, by (1 + v, n) trust in the points and each picture."""
+    sights = [each.look(texels.positions, texels.normals[texels.block]) for each in vistas]
+    density = np.zeros(len(texels.row), np.float32)
+    for sight, sure in zip(sights, trust[1:], strict=True):
         of = sight.which
-        colors[number, of], near[number, of] = each.read(sight, sigma_m[of], texel_m)
-        trust[number, of] = sight.trust
-    if len(looked):
-        near /= np.maximum(near.max(0), 1e-12)
-    return colors, trust, near
+        density[of] += sure[of] * sight.trust / np.maximum(sight.pixel_m, texel_m) ** 2
+    told = of_points(texels, index, texel_m, settings, density)
+    weight = trust[0] * told.mass + np.float32(_LEAST)
+    total = told.colors * weight[:, None]
+    for each, sight, sure in zip(vistas, sights, trust[1:], strict=True):
+        of = sight.which
+        shown, mass = each.read(sight, told.sigma_m[of], texel_m)
+        mass *= sure[of] * sight.trust
+        weight[of] += mass
+        total[of] += shown * mass[:, None]
+    return np.asarray(total / weight[:, None], np.float32)
 
 
-def agreed(shown: Float32, vote: Float32, weight: Float32) -> Float32:
-    """The blend of what agrees.
+def believed(
+    texels: Texels, vistas: tuple[Vista, ...], index: ColorIndex, settings: Settings
+) -> Float32:
+    """(1 + v, b) how far the points and each picture agree with most of the evidence, by block."""
+    blocks = texels.blocks()
+    none = np.zeros(len(blocks.row), np.float32)
+    shown = [of_points(blocks, index, _TOLD_M, settings, none).colors]
+    vote = [np.full(len(none), _POINTS_VOTE, np.float32)]
+    for each in vistas:
+        sight = each.look(blocks.positions, blocks.normals)
+        shown.append(np.zeros_like(shown[0]))
+        vote.append(none.copy())
+        width = np.full(len(sight.which), _TOLD_M / 2, np.float32)
+        shown[-1][sight.which] = each.read(sight, width, _TOLD_M)[0]
+        vote[-1][sight.which] = sight.trust
+    return agreement(np.stack(shown), np.stack(vote))
+
+
+def agreement(shown: Float32, vote: Float32) -> Float32:
+    """How far each source agrees with the median of all.
 
     Args:
         shown: (v, n, 3) colours.
         vote: (v, n) weights of the median; not all 0 anywhere.
-        weight: (v, n) weights of the blend.
 
     Returns:
-        (n, 3) colours.
+        (v, n) 0 to 1.
     """
     order = shown.sum(2).argsort(0)
     below = np.take_along_axis(vote, order, 0).cumsum(0)
     middle = np.take_along_axis(order, (below >= below[-1] / 2).argmax(0)[None], 0)
     off = np.abs(shown - np.take_along_axis(shown, middle[..., None], 0)).max(2)
-    trusted = weight / (1 + (off / np.float32(_APART)) ** 4)
-    blend = np.einsum("vn,vnc->nc", trusted, shown) / np.maximum(trusted.sum(0), 1e-12)[:, None]
-    return np.asarray(blend, np.float32)
+    return np.asarray(1 / (1 + (off / np.float32(_APART)) ** 8), np.float32)

@@ -20,7 +20,7 @@ _LARGEST_CELL_M = 0.5
 _FEWER = 0.7
 _TEXELS_AT_ONCE = 100_000
 _CELL_OF_TEXEL = 0.75  # a level's cells are at most so large
-_SIGMA_OF_SPACING = 0.45  # narrow enough for letters a few points wide
+_SIGMA_OF_SPACING = 0.5  # narrow enough for letters a few points wide
 _SIGMA_OF_TEXEL = 0.4
 _REACH_OF_SPACING = 3.0  # of a level's cells
 
@@ -133,23 +133,48 @@ def _facing(normals: Float32) -> Int64:
     return np.asarray(axis * 2 + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0))
 
 
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What the points tell of n texels.
+
+    Attributes:
+        colors: (n, 3) float32.
+        mass: (n,) float32, sum of the weights of the points blended, 1 for one at the very place.
+        sigma_m: (n,) float32, width of the blend's bell.
+    """
+
+    colors: Float32
+    mass: Float32
+    sigma_m: Float32
+
+
 def of_points(
-    texels: Texels, which: Int64, index: ColorIndex, texel_m: float, settings: Settings
-) -> Float32:
-    """(n, 3) colours of n of the texels."""
+    texels: Texels, index: ColorIndex, texel_m: float, settings: Settings, others: Float32
+) -> Told:
+    """What the points tell of the texels.
+
+    Args:
+        texels: n of them.
+        index: Of their room.
+        texel_m: Edge of a texel.
+        settings: See there.
+        others: (n,) samples of pictures on a square metre there: the denser all samples lie, the
+            narrower the blend.
+    """
     first = 0
     while (
         first + 1 < len(index.levels) and index.levels[first + 1].cell_m <= _CELL_OF_TEXEL * texel_m
     ):
         first += 1
-    colors = np.zeros((len(which), 3), np.float32)
-    left = np.arange(len(which))
+    count = len(texels.row)
+    told = Told(*(np.zeros((count, *shape), np.float32) for shape in ((3,), (), ())))
+    left = np.arange(count)
     for level in index.levels[first:]:
         if not len(left):
             break
-        colors[left], known = _blend(texels, which[left], level, texel_m, settings)
+        known = _blend(texels, left, level, texel_m, settings, others, told)
         left = left[~known]
-    return colors
+    return told
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +187,7 @@ class _Nearby:
         off: (k, b) squared distance beyond noise off the surface; infinite for a point that
             looks another way than the block.
         colors: (3, k, b) float32.
-        sigma_m: (b,) width of the blend.
+        spacing_m: (b,) of the points.
         alone: (b,) no point looks the block's way; all were taken instead.
     """
 
@@ -170,7 +195,7 @@ class _Nearby:
     y: Float32
     off: Float32
     colors: Float32
-    sigma_m: Float32
+    spacing_m: Float32
     alone: Bool
 
 
@@ -183,18 +208,19 @@ def _nearby(
     )
     # ``count`` points lie in a disc of that radius.
     spacing = distance[-1] * np.sqrt(np.pi / count)
-    sigma = np.maximum(spacing * _SIGMA_OF_SPACING, _SIGMA_OF_TEXEL * texel_m).astype(np.float32)
+    spacing = np.maximum(spacing, 1e-6).astype(np.float32)
+    noise = np.maximum(spacing * _SIGMA_OF_SPACING, np.float32(_SIGMA_OF_TEXEL * texel_m))
     right, up = _frames(normals)
     offset = level.points[near] - middles.astype(np.float32)
     x, y, above = (np.einsum("kbx,bx->kb", offset, axis) for axis in (right, up, normals))
     # Noise lifts points off the surface: what counts is the distance along it, unless a point
     # is off by more than noise.
-    off = np.maximum(np.abs(above) - sigma, 0) ** 2
+    off = np.maximum(np.abs(above) - noise, 0) ** 2
     agrees = np.einsum("kbx,bx->kb", level.normals[near], normals) > settings.agree_cos
     alone = ~agrees.any(0)
     colors = np.stack([level.colors[near, i].astype(np.float32) for i in range(3)])
     off = np.where(agrees | alone, off, np.float32(np.inf))
-    return _Nearby(x, y, off, colors, sigma, alone)
+    return _Nearby(x, y, off, colors, spacing, alone)
 
 
 def _frames(normals: Float32) -> tuple[Float32, Float32]:
@@ -205,9 +231,15 @@ def _frames(normals: Float32) -> tuple[Float32, Float32]:
 
 
 def _blend(
-    texels: Texels, which: Int64, level: Level, texel_m: float, settings: Settings
-) -> tuple[Float32, Bool]:
-    """(n, 3) colours of n texels from one level, and (n,) whether the level supports them."""
+    texels: Texels,
+    which: Int64,
+    level: Level,
+    texel_m: float,
+    settings: Settings,
+    others: Float32,
+    told: Told,
+) -> Bool:
+    """Write n texels' part of ``told`` from one level; (n,) whether the level supports them."""
     blocks, block = np.unique(texels.block[which], return_inverse=True)
     normals = texels.normals[blocks]
     middles = texels.middles[blocks]
@@ -216,19 +248,23 @@ def _blend(
     x = np.einsum("tx,tx->t", offset, right[block])
     y = np.einsum("tx,tx->t", offset, up[block])
     reach_m = max(settings.reach_m, _REACH_OF_SPACING * level.cell_m)
-    colors = np.empty((len(which), 3), np.float32)
     known = np.empty(len(which), bool)
     nearby = _nearby(middles, normals, level, texel_m, settings)
     for start in range(0, len(which), _TEXELS_AT_ONCE):
         part = slice(start, start + _TEXELS_AT_ONCE)
-        of = block[part]
+        of, to = block[part], which[part]
         far = (nearby.x[:, of] - x[part]) ** 2
         far += (nearby.y[:, of] - y[part]) ** 2
         far += nearby.off[:, of]
         nearest = far.min(0)
         known[part] = (nearest <= reach_m**2) & ~nearby.alone[of]
-        weight = np.exp((nearest - far) / (2 * nearby.sigma_m[of] ** 2))
+        density = 1 / nearby.spacing_m[of] ** 2 + others[to]
+        sigma = np.maximum(_SIGMA_OF_SPACING / np.sqrt(density), _SIGMA_OF_TEXEL * texel_m)
+        half = 1 / (2 * sigma**2)
+        weight = np.exp((nearest - far) * half)
         total = weight.sum(0)
         for i in range(3):
-            colors[part, i] = (weight * nearby.colors[i][:, of]).sum(0) / total
-    return colors, known
+            told.colors[to, i] = (weight * nearby.colors[i][:, of]).sum(0) / total
+        told.mass[to] = total * np.exp(-nearest * half)
+        told.sigma_m[to] = sigma
+    return known

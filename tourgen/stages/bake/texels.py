@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +34,23 @@ class Texels:
     positions: Float32
     middles: Float64
     normals: Float32
+
+    def part(self, which: slice) -> Texels:
+        """Some of the texels, of the same blocks."""
+        return replace(
+            self,
+            row=self.row[which],
+            column=self.column[which],
+            block=self.block[which],
+            positions=self.positions[which],
+        )
+
+    def blocks(self) -> Texels:
+        """The blocks' middles, as if they were texels."""
+        number = np.arange(len(self.middles))
+        return Texels(
+            number, number, number, self.middles.astype(np.float32), self.middles, self.normals
+        )
 
 
 def texels_of(uv_mesh: UvMesh) -> Texels:

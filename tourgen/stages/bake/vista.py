@@ -113,7 +113,7 @@ class Vista:
             (n, 3) colours without the gain; (n,) sum of the weights.
         """
         fine = np.log2(np.maximum(texel_m / np.maximum(sight.pixel_m, 1e-6), 1))
-        level = np.minimum(np.rint(fine).astype(np.int64), len(self.pyramid) - 1)
+        level = np.minimum(fine.astype(np.int64), len(self.pyramid) - 1)
         colors = np.empty((len(level), 3), np.float32)
         mass = np.empty(len(level), np.float32)
         for each in np.unique(level):
@@ -141,8 +141,7 @@ class Vista:
             for below in (0, 1):
                 r = top + below - row
                 far = metric[0] * c * c + 2 * metric[1] * c * r + metric[2] * r * r
-                # The blend's own weights keep it from jumping where the four pixels change.
-                weight = np.exp(-far) * (1 - np.abs(c)) * (1 - np.abs(r))
+                weight = np.exp(-far)
                 total += weight[:, None] * image[np.clip(top + below, 0, height - 1), at_column]
                 mass += weight
         return total / mass[:, None], mass
