@@ -97,16 +97,33 @@ def entering(start: Viewpoint | None) -> Entering:
 
 
 def unwrapped(room: tuple[Tile, ...], cloud: PointCloud, asked: Texels) -> tuple[UvMesh, ...]:
+    """Unwrap each tile of a room that points alone will colour."""
+    return _unwrapped(room, cloud, (), asked)
+
+
+def unwrapped_for_pictures(
+    room: tuple[Tile, ...], cloud: PointCloud, scan: RoomScan, asked: Texels
+) -> tuple[UvMesh, ...]:
+    """Unwrap each tile of a room that its scan's panoramas, if any, will colour too."""
+    return _unwrapped(room, cloud, scan.panoramas, asked)
+
+
+def _unwrapped(
+    room: tuple[Tile, ...], cloud: PointCloud, panoramas: tuple[Panorama, ...], asked: Texels
+) -> tuple[UvMesh, ...]:
     """Unwrap each tile.
 
-    A leaf's texels are half as wide as the scan's spacing there, down to the size asked for; a
-    branch's are twice those below it; the root's make a picture of a fixed size.
+    A leaf's texels are half as wide as the spacing of the samples that colour it, points and the
+    nearest panorama's pixels, down to the size asked for; a branch's are twice those below it; the
+    root's make a picture of a fixed size.
     """
-    texel_m = _texels(room, cKDTree(cloud.points), asked.texel_mm / 1000)
+    texel_m = _texels(room, cKDTree(cloud.points), panoramas, asked.texel_mm / 1000)
     return tuple(unwrap.unwrap(tile.mesh, unwrap.Settings(texel_m[tile.id])) for tile in room)
 
 
-def _texels(room: tuple[Tile, ...], tree: cKDTree, finest_m: float) -> dict[str, float]:
+def _texels(
+    room: tuple[Tile, ...], tree: cKDTree, panoramas: tuple[Panorama, ...], finest_m: float
+) -> dict[str, float]:
     rng = np.random.default_rng(0)
     texel_m: dict[str, float] = {}
     for tile in reversed(room):  # children first
@@ -117,11 +134,22 @@ def _texels(room: tuple[Tile, ...], tree: cKDTree, finest_m: float) -> dict[str,
         sample = vertices[rng.choice(len(vertices), min(200, len(vertices)), replace=False)]
         _, nearest = tree.query(sample)
         spacing_m = spacing_at(tree, tree.data[nearest].astype(np.float32))
-        texel_m[tile.id] = max(finest_m, 0.5 * float(np.median(spacing_m)))
+        density = 1 / np.maximum(spacing_m, 1e-6) ** 2 + _pixels_on(sample, panoramas)
+        texel_m[tile.id] = max(finest_m, 0.5 * float(np.median(1 / np.sqrt(density))))
     root = room[0]
     if root.children:
         texel_m[root.id] = float(np.sqrt(face_areas(root.mesh).sum() / _ROOT_TEXELS))
     return texel_m
+
+
+def _pixels_on(places: Float32, panoramas: tuple[Panorama, ...]) -> Float64:
+    """(n,) pixels of the nearest panorama on a square metre that faces it."""
+    density = np.zeros(len(places))
+    for each in panoramas:
+        distance_m = np.linalg.norm(places - each.position, axis=1)
+        pixel_rad2 = each.pixel_rad[0] * each.pixel_rad[1]
+        density = np.maximum(density, 1 / (pixel_rad2 * np.maximum(distance_m, 0.1) ** 2))
+    return density
 
 
 def baked(

@@ -18,6 +18,8 @@ _ACROSS = 0.1
 """Share of the weight across a crease from which on it is one."""
 _DENSEST, _SPARSEST = 0.5, 2.0
 """The part of the room's spacing that a region's own counts for, at least and at most."""
+_FADE = 0.3
+"""Last part of a plane's reach over which another surface may take over."""
 _MARGIN = 0.2
 """How far the grid goes on around the points, in their extent: a surface that closes gaps may."""
 
@@ -27,7 +29,7 @@ class _Sides:
     """The planes near n places, on the side of the nearest one and across a crease from it.
 
     Attributes:
-        known: (n,) whether the nearest plane reaches there.
+        far: (n,) how far off the nearest plane's point lies, in its reach.
         here: (n,) distance to those like the nearest.
         across: (n,) distance to the others.
         normals: (2, n, 3) mean normal of either side, not of unit length.
@@ -35,7 +37,7 @@ class _Sides:
         edge: (n,) whether it is an edge, no corner.
     """
 
-    known: npt.NDArray[np.bool_]
+    far: Float32
     here: Float32
     across: Float32
     normals: Float32
@@ -91,13 +93,14 @@ class Field:
         parts = [self._normal(places[at : at + _CHUNK]) for at in range(0, len(places), _CHUNK)]
         return np.concatenate([np.empty((0, 3), np.float32), *parts])
 
-    def _distance(self, key: Keys) -> Float32:
-        """At an edge or a thin wall a place is in front of one side, in a corner of both."""
+    def faded(self, key: Keys) -> tuple[Float32, Float32]:
+        """(n,) distances at (n,) corners, and how much they are worth, 1 to 0 where unknown."""
         sides = self._sides(self.places(key))
-        here, across = sides.here, sides.across
-        both = np.where(sides.edge, np.maximum(here, across), np.minimum(here, across))
-        distance = here + sides.share * (both - here)
-        return np.where(sides.known, distance, np.float32(np.nan))
+        return _between(sides), np.clip((1 - sides.far) / np.float32(_FADE), 0, 1)
+
+    def _distance(self, key: Keys) -> Float32:
+        sides = self._sides(self.places(key))
+        return np.where(sides.far < 1, _between(sides), np.float32(np.nan))
 
     def _normal(self, places: Float32) -> Float32:
         """Of that side of a crease on whose planes the place lies."""
@@ -105,7 +108,7 @@ class Field:
         other = (sides.share > 0) & (np.abs(sides.across) < np.abs(sides.here))
         normal = np.where(other[:, None], sides.normals[1], sides.normals[0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
-        return np.where(sides.known[:, None], normal, np.float32(np.nan))
+        return np.where((sides.far < 1)[:, None], normal, np.float32(np.nan))
 
     def _sides(self, place: Float32) -> _Sides:
         rank = np.arange(1, self._count + 1)
@@ -116,7 +119,7 @@ class Field:
         height = np.einsum("ikj,ikj->ik", offset, normals)
         reach_m = self._reach_m[near[:, 0]]
         foot_m2 = np.square(away[:, 0]) - np.square(height[:, 0])
-        known = (foot_m2 < np.square(reach_m)) & (np.abs(height[:, 0]) < reach_m)
+        far = np.sqrt(np.maximum(foot_m2, np.square(height[:, 0]))) / reach_m
         weight = np.square(1 - np.square(away / np.maximum(away[:, -1:], 1e-9)))
         weight[:, 0] += np.float32(1e-6)  # all may be equally far
         weight /= weight.sum(axis=1, keepdims=True)
@@ -129,7 +132,14 @@ class Field:
         rise -= np.einsum("ikj,ikj->ik", normals, between)
         edge = (others * rise).sum(axis=1) < 0
         share = np.minimum(others.sum(axis=1) / np.float32(_ACROSS), 1)
-        return _Sides(known, here, across, np.stack([normal, beyond]), share, edge)
+        return _Sides(far, here, across, np.stack([normal, beyond]), share, edge)
+
+
+def _between(sides: _Sides) -> Float32:
+    """At an edge or a thin wall a place is in front of one side, in a corner of both."""
+    here, across = sides.here, sides.across
+    both = np.where(sides.edge, np.maximum(here, across), np.minimum(here, across))
+    return np.asarray(here + sides.share * (both - here), np.float32)
 
 
 def _over_round(

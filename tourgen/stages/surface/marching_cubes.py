@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +32,10 @@ CELL_CORNERS: Keys = np.array(
     [(c & 1) * STEPS[0] + (c >> 1 & 1) * STEPS[1] + (c >> 2) for c in range(8)]
 )
 """From a cell's lowest corner to each; bit 0 of a corner's number is x, 1 y, 2 z."""
+AROUND: Keys = np.array(
+    [np.dot(way, STEPS) for way in product((-1, 0, 1), repeat=3) if way != (0, 0, 0)]
+)
+"""From a corner's key to those of its 26 neighbours."""
 _EDGES = [(c, c | 1 << axis) for axis in range(3) for c in range(8) if not c >> axis & 1]
 _MOST_LOOPS = 4
 _LONGEST_LOOP = 7
@@ -83,7 +88,7 @@ def marching_cubes(
         Faces counter-clockwise seen from where the value is positive; cells share vertices.
         No faces where nothing crosses zero.
     """
-    after = np.stack([_find(key, key + step) for step in STEPS], axis=1)
+    after = np.stack([find(key, key + step) for step in STEPS], axis=1)
     cells = _cells(after, value)
     case = ((value[cells] > 0) << np.arange(8)).sum(axis=1)
     crossed = (case > 0) & (case < 255)
@@ -100,7 +105,7 @@ def marching_cubes(
     return Mesh(origin, vertices[used], faces)
 
 
-def _find(key: Keys, wanted: Keys) -> Int32:
+def find(key: Keys, wanted: Keys) -> Int32:
     """Position of each sorted key among the sorted ones, -1 where it is not there."""
     at = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
     return np.where(key[at] == wanted, at, -1).astype(np.int32)

@@ -48,7 +48,9 @@ from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud
 from tourgen.stages.surface.field import Field
 from tourgen.stages.surface.growing import grown
 from tourgen.stages.surface.marching_cubes import (
+    AROUND,
     Keys,
+    find,
     marching_cubes,
     most_cells,
 )
@@ -181,19 +183,22 @@ class Distances:
         )
 
     def carried_on(self, beyond: Beyond) -> Distances:
-        """The same, and where it is unknown the distance to another surface."""
-        unknown = np.isnan(self.value)
-        value = self.value.copy()
-        value[unknown] = beyond.distance(self.field.places(self.key[unknown]))
+        """The same, fading into the distance to another surface where it becomes unknown."""
+        field = self.field
 
         def told(key: Keys) -> Float32:
-            found = self.field.distance(key)
-            open_ = np.isnan(found)
-            found[open_] = beyond.distance(self.field.places(key[open_]))
-            return found
+            distance, trust = field.faded(key)
+            rest = trust < 1
+            theirs = beyond.distance(field.places(key[rest]))
+            distance[rest] = trust[rest] * distance[rest] + (1 - trust[rest]) * theirs
+            return distance
 
-        seeds = np.concatenate([self.field.seeds, self.field.cells(beyond.seeds)])
-        return _grown(self.field, told, seeds, self.key, value)
+        rim = find(self.key, self.key[np.isnan(self.value)][:, None] + AROUND)
+        rim = np.unique(rim[rim >= 0])
+        value = self.value.copy()
+        value[rim] = told(self.key[rim])
+        seeds = np.concatenate([field.seeds, field.cells(beyond.seeds)])
+        return _grown(field, told, seeds, self.key, value)
 
 
 def distances(planes: TangentPlanes, settings: Settings) -> Distances:
