@@ -13,8 +13,10 @@ from tourgen.fitting.lengths import Corner, support_m
 from tourgen.fitting.points import RoomScan, moved
 from tourgen.fitting.surface import Drawn
 from tourgen.geometry import (
+    Float32,
     Float64,
     OrientedCloud,
+    Panorama,
     PointCloud,
     TexturedMesh,
     Tile,
