@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scanned import EYES, ROOM, beams, cloud_of, inside, noisy, ranges, solid
+from scanned import EYES, ROOM, Cast, beams, cloud_of, inside, noisy, ranges, solid
 
 from tourgen.errors import InputError
 from tourgen.geometry import PointCloud
 from tourgen.stages import sift
+from tourgen.stages.sift.grown import bodies
+from tourgen.stages.sift.nearby import nearby
+from tourgen.stages.sift.picture import picture
+from tourgen.stages.sift.views import View, views
 
 SETTINGS = sift.Settings(min_points=100)
 PERSON = solid([0.0, -1.2, 0.0], [0.4, -0.8, 1.75])
@@ -50,6 +54,77 @@ def test_a_thin_rod_stays() -> None:
     rod = (np.abs(cloud.points[:, :2] - 0.31) < 0.02).all(axis=1)
     assert rod.sum() > 100
     assert kept(cloud, sift.sift(cloud, EYES, SETTINGS))[rod].mean() > 0.9
+
+
+def test_a_clean_scan_stays_whole() -> None:
+    """Also what is seen at a grazing angle, where points are few."""
+    parts, _ = scans(TABLE, solid([1.6, -1.9, 0.0], [2.4, -1.3, 1.4]))
+    cloud = cloud_of(parts)
+    assert kept(cloud, sift.sift(cloud, EYES, SETTINGS)).mean() > 0.9995
+
+
+def tube(radius_m: float, axis_y: float, axis_z: float) -> Cast:
+    """Range to a long tube along x, seen from outside."""
+
+    def cast(eye: np.ndarray, way: np.ndarray) -> np.ndarray:
+        y, z = eye[1] - axis_y, eye[2] - axis_z
+        square = way[:, 1] ** 2 + way[:, 2] ** 2
+        middle = -(y * way[:, 1] + z * way[:, 2])
+        inside = middle**2 - square * (y * y + z * z - radius_m**2)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            reach = (middle - np.sqrt(inside)) / square
+        return np.where((inside > 0) & (reach > 0), reach, np.inf)
+
+    return cast
+
+
+def test_a_handrail_few_beams_wide_stays() -> None:
+    parts, _ = scans(tube(0.025, 0.1, 1.0), step_deg=0.5)
+    cloud = cloud_of(parts)
+    rail = np.hypot(cloud.points[:, 1] - 0.1, cloud.points[:, 2] - 1.0) < 0.032
+    assert rail.sum() > 3000
+    assert kept(cloud, sift.sift(cloud, EYES, SETTINGS))[rail].mean() > 0.955
+
+
+def test_a_lamp_on_a_wire_that_no_beam_meets_stays() -> None:
+    parts, _ = scans(solid([-0.1, -0.1, 1.9], [0.1, 0.1, 2.1]))
+    cloud = cloud_of(parts)
+    lamp = (np.abs(cloud.points - [0, 0, 2.0]) < 0.12).all(axis=1)
+    assert 60 < lamp.sum() < 0.05 * len(cloud)
+    settings = sift.Settings(min_points=100, island_share=0.05)
+    assert kept(cloud, sift.sift(cloud, EYES, settings))[lamp].mean() > 0.85
+
+
+def test_what_lies_apart_outside_goes() -> None:
+    parts, _ = scans()
+    yard = np.random.default_rng(4).uniform([8, 0, 0], [8.4, 0.4, 0.4], (400, 3))
+    cloud = cloud_of([np.concatenate([parts[0], yard]), parts[1]])
+    settings = sift.Settings(min_points=100, island_share=0.05)
+    left = kept(cloud, sift.sift(cloud, EYES, settings))
+    assert not left[len(parts[0]) : len(parts[0]) + 400].any()
+
+
+def test_a_person_is_a_body_and_what_is_mixed_along_edges_is_none() -> None:
+    rng, way = np.random.default_rng(5), beams(0.6)
+    slats = [solid([x, 1.0, 0.3], [x + 0.03, 1.03, 1.5]) for x in np.arange(-0.6, 0.6, 0.09)]
+    points, mixed = [], []
+    for eye in EYES:
+        true = ranges(eye, way, WALLS, *slats)
+        beside = np.roll(true, -1, axis=1)
+        edge = (np.abs(true - beside) > 0.05) & (rng.random(true.shape) < 1 / 3)
+        share = rng.uniform(0.1, 0.9, true.shape)
+        seen = np.where(edge, share * true + (1 - share) * beside, true)
+        points.append((eye + way * noisy(seen, rng)[..., None]).reshape(-1, 3))
+        mixed.append(edge.reshape(-1))
+    parts, person = scans(passer_by=True)
+    for cloud, gone, share in (
+        (cloud_of(points), np.concatenate(mixed), 0.0),
+        (cloud_of(parts), person, 1.0),
+    ):
+        assert gone.sum() > 500
+        found = bodies(cloud.points, gone, list(views(cloud, EYES)))
+        assert found[gone].mean() == pytest.approx(share, abs=0.1)
+        assert not found[~gone].any()
 
 
 def test_mixed_pixels_go_and_edges_stay() -> None:
@@ -111,6 +186,8 @@ def test_a_mirrored_room_goes_and_one_behind_a_window_stays(glass: str) -> None:
         assert sifted.removed["reflected"] > 0.9 * seen_behind.sum()
     else:
         assert sifted.removed["reflected"] == 0
+    merged = cloud_of(parts, merged=True)
+    assert kept(merged, sift.sift(merged, EYES, SETTINGS))[~seen_behind].mean() > 0.99
 
 
 BOXES = (([-1.0, -0.2, 0.0], [-0.2, 0.3, 0.9]), ([0.6, -1.9, 0.9], [1.6, -1.5, 1.6]))
@@ -163,6 +240,55 @@ def test_a_thousand_duplicates_do_no_harm() -> None:
     wrong = np.concatenate([person[: len(parts[0])], np.zeros(1000, bool), person[len(parts[0]) :]])
     assert left[wrong].mean() < 0.01
     assert left[~wrong].mean() > 0.99
+
+
+def view_of(way: np.ndarray, reach: np.ndarray) -> View:
+    points = (EYES[0] + way.reshape(-1, 3) * reach.reshape(-1, 1)).astype(np.float32)
+    (view,) = views(cloud_of([points]), EYES[:1])
+    return view
+
+
+def test_noise_is_told_from_smooth_surfaces() -> None:
+    rng, way = np.random.default_rng(0), beams(0.5)
+    view = view_of(way, noisy(ranges(EYES[0], way, WALLS), rng))
+    assert np.abs(view.noise_m / 0.0015 - 1).max() < 0.3
+    assert np.median(view.noise_m) == pytest.approx(0.0015, rel=0.1)
+    assert view.smooth.mean() > 0.85
+    assert np.degrees(view.picture.step_rad) == pytest.approx(0.5, rel=0.1)
+
+
+def test_a_slanted_surface_is_looked_through_to_the_centimetre() -> None:
+    rng, way = np.random.default_rng(0), beams(0.5)
+    view = view_of(way, noisy(ranges(EYES[0], way, WALLS), rng))
+    places = rng.uniform([-0.5, -1.5, 0], [2, 1.5, 0], (500, 3)).astype(np.float32)
+    for height_m, passed in ((0.0, 0.0), (0.04, 0.99)):
+        _, beyond_m = view.beyond_m(places + np.float32([0, 0, height_m]))
+        assert (beyond_m > 0.02).mean() == pytest.approx(passed, abs=0.01)
+
+
+@pytest.mark.parametrize("case", ["far away", "one spot", "one far off"])
+def test_a_picture_has_few_cells_for_each_point(case: str) -> None:
+    rng = np.random.default_rng(0)
+    points = rng.random((5000, 3)).astype(np.float32) + np.float32([0.5, 0.5, 0.5])
+    if case == "far away":
+        points += np.float32(500)
+    elif case == "one spot":
+        points[10:] = points[0]
+    else:
+        points[:-1] += np.float32(500)
+    range_m = np.linalg.norm(points, axis=1)
+    seen = picture(points / range_m[:, None], range_m)
+    assert seen.beams.size < 8 * len(points)
+
+
+def test_nearby_misses_none_and_takes_few_more() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-3, 3, (4000, 3)).astype(np.float32)
+    places = rng.uniform(-1, 1, (30, 3)).astype(np.float32)
+    distance = np.linalg.norm(points[:, None] - places, axis=2).min(axis=1)
+    found = nearby(points, places, 0.3)
+    assert found[distance < 0.3].all()
+    assert not found[distance > 0.3 * 2 * np.sqrt(3)].any()
 
 
 def test_too_few_points_are_told() -> None:

@@ -3,13 +3,23 @@
 In this order, since each step trusts what the ones before left:
 
 - *reflected*: what lies behind a mirror (``mirrors.py``).
-- *passed*: what another station looked through (``through.py``), a passer-by above all.
-- *mixed*: returns of beams that struck two surfaces at once (``mixed.py``).
+- *passed*: what another station looked through (``through.py``), a passer-by above all, and the
+  rest of a body most of which was (``grown.py``).
+- *mixed*: returns of beams that struck two surfaces at once (``mixed.py``, ``rejoin.py``).
 - *strays*: points and clusters apart from all else (``strays.py``).
 
-The first takes a scan that tells which station measured each point; the second takes stations,
-and is more careful where it must guess which of them measured a point. Where no station is known,
-statistics are left.
+Stations that are known, and which of them measured each point, make the first three; where a scan
+does not tell who measured a point, every station that may see it is asked. Where no station is
+known, statistics are left.
+
+What makes it quick is to ask few points: those on a smooth surface, five sixths of a room, are
+told by the planes of each station's picture (``picture.py``) and need no search for neighbours.
+
+Measured by tests/peers/cleaning.py on the demo's three rooms, from the E57 and from the merged
+PLY: all strays and passers-by gone, 99.8 % of reflections, 89 to 95 % of the mixed pixels more than
+10 mm off; 0.04 to 0.07 % of the true points go too, and 0.10 to 0.20 % of the true area seen is
+left without a point within 10 mm. A gallery by another simulator: all strays, 86 % of such mixed
+pixels, 0.13 % of the area. 8 to 14 CPU-seconds a million points.
 """
 
 from __future__ import annotations
@@ -29,7 +39,7 @@ from tourgen.stages.sift.strays import clusters, islands, isolated
 from tourgen.stages.sift.through import passed
 from tourgen.stages.sift.views import View, views
 
-VERSION = 1
+VERSION = 2
 Mask = npt.NDArray[np.bool_]
 
 
@@ -41,7 +51,7 @@ class Settings:
         min_points: Fewest points that make a room.
         margin_m: How far behind a place a beam must end to have passed it.
         behind_m: What lies farther behind a mirror, on a beam through it, is a reflection.
-        mixed_m: A mixed pixel this near to a surface may stay.
+        mixed_m: A mixed pixel this near to points that stay may stay too.
         neighbours: Points that make a neighbourhood in space.
         isolation_ratio: A point is a stray when its mean distance to its neighbours exceeds
             theirs by this factor.

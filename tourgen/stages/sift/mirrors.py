@@ -101,7 +101,10 @@ def reflections(
         if mirror is None:
             continue
         for each in seen:
-            gone[each.index[mirror.hides(each.station, points[each.index], behind_m)]] = True
+            hidden = mirror.hides(each.station, points[each.index], behind_m)
+            # Another station may have measured a wall there, where it is not told which did.
+            hidden &= each.told | (cluster[each.index] > 0)
+            gone[each.index[hidden]] = True
     return gone
 
 

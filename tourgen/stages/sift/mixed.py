@@ -4,7 +4,9 @@ Such a return lies on its beam somewhere between the two. In the station's pictu
 pixel whose range is that of neither side. The test is the other way round: a true point has
 company. The points of a plane have inverse ranges that are linear in the picture, whatever the
 slant, so a true point lies on a plane through two of its eight nearest neighbours in the picture
-on which several more of the nearest twenty lie, to within the noise.
+on which several more of the nearest twenty lie, to within the noise. Only points off the plane
+about their cell are asked: not one of the demo's 7,800 mixed pixels lies on one. Who is lonely in
+the picture may still have company in space (``rejoin.py``): rods, rims, tubes.
 """
 
 from __future__ import annotations
@@ -46,6 +48,7 @@ def mixed(points: Float32, seen: Iterable[View], near_m: float) -> Mask:
     for view in seen:
         lonely = np.zeros(len(view), np.bool_)
         suspect = np.flatnonzero(~view.smooth)
+        suspect = suspect[np.argsort(view.cell[suspect], kind="stable")]
         if len(view) > _NEAR and len(suspect):
             around = view.around(suspect, _NEAR)
             for at in view.blocks(suspect):

@@ -34,12 +34,14 @@ class View:
         index: (m,) which points of the cloud they are.
         direction: (m, 3) unit vectors from the station.
         range_m: (m,) from the station.
+        told: (m,) whether the scan says that this station measured the point.
     """
 
     station: Float64
     index: npt.NDArray[np.int64]
     direction: Float32
     range_m: Float32
+    told: Mask
 
     def __len__(self) -> int:
         return len(self.index)
@@ -104,14 +106,15 @@ class View:
         beyond = self.picture.nearest_m.reshape(-1)[cell] - distance
         beyond[cell < 0] = -np.inf
         inverse = self.picture.inverse(cell, offset)
-        at = np.flatnonzero((cell >= 0) & (beyond < 0) & (inverse > 0) & (inverse * distance < 1))
+        at = np.flatnonzero((cell >= 0) & (inverse > 0) & (inverse * distance < 1))
         reach = 1 / inverse[at]
         rough_m = self.picture.rough.reshape(-1)[cell[at]] * reach**2
         flat = rough_m < _SMOOTH * self.noise_at(reach)
         flat &= self.picture.beams.reshape(-1)[cell[at]] >= _SURFACE_BEAMS
         at, reach = at[flat], reach[flat]
         cosine = 1 / np.hypot(1, self.picture.slope(cell[at], way[at]))
-        beyond[at] = (reach - distance[at]) * np.minimum(1, 2 * cosine)
+        further = (reach - distance[at]) * np.minimum(1, 2 * cosine)
+        beyond[at] = np.maximum(beyond[at], further)
         return cell, beyond
 
     def around(self, at: npt.NDArray[np.int64], count: int) -> Surroundings:
@@ -122,6 +125,7 @@ class View:
         here = binary_dilation(here, np.ones((1, wide), np.bool_))
         here = binary_dilation(here, np.ones((wide, 1), np.bool_))
         near = np.flatnonzero(here.reshape(-1)[self.cell])
+        near = near[np.argsort(self.cell[near], kind="stable")]  # in memory as in space
         return Surroundings(self, near if len(near) > count else np.arange(len(self)))
 
     def blocks(self, at: npt.NDArray[np.int64]) -> Iterator[npt.NDArray[np.int64]]:
@@ -168,7 +172,7 @@ def views(cloud: PointCloud, stations: Float64) -> Iterator[View]:
         index, way, range_m = index[away], way[away], range_m[away]
         way /= range_m[:, None]
         if len(index):
-            yield View(station, index, way, range_m)
+            yield View(station, index, way, range_m, cloud.station[index] == number)
 
 
 def _in_sight(points: Float32, station: Float64) -> npt.NDArray[np.bool_]:
