@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -96,6 +98,24 @@ def test_the_other_side_of_a_board_lends_no_colour() -> None:
     _, colors = seen(baked(both))
     assert colors[:, 2].max() == 0
     assert colors[:, 0].min() == 200
+
+
+def test_no_colour_bleeds_through_a_board_thinner_than_the_points_lie_apart() -> None:
+    """Each side is seen by its own station; normals are known at one point in five."""
+    at, color = spread(40_000, 3), np.zeros((40_000, 3))
+    back = np.arange(40_000) % 2 == 1
+    at[back, 2] -= 0.002
+    color[back], color[~back] = (0, 0, 200), (200, 0, 0)
+    normals = np.where(back[:, None], -np.array(UP), UP)
+    both = oriented(at, normals, color)
+    station = back.astype(np.int16)
+    whole = replace(both.cloud, station=station)
+    some = np.random.default_rng(0).random(40_000) < 0.2
+    known = OrientedCloud(whole.take(some), both.normals[some], both.stations)
+    tile = unwrap.unwrap(sheet(1.0, 1.0, 8), unwrap.Settings(TEXEL_M))
+    _, colors = seen(bake(tile, color_index(whole, known, TEXEL_M), Settings()))
+    assert colors[:, 2].mean() < 1
+    assert (colors[:, 2] > 20).mean() < 0.01
 
 
 def test_a_hole_takes_the_colours_about_it() -> None:

@@ -34,7 +34,7 @@ __all__ = [
     "vistas",
 ]
 
-VERSION = 3
+VERSION = 4
 
 
 def bake(

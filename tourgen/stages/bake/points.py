@@ -19,6 +19,8 @@ _LEAF_POINTS = 24
 _LARGEST_CELL_M = 0.5
 _FEWER = 0.7
 _TEXELS_AT_ONCE = 100_000
+_POINTS_AT_ONCE = 500_000
+_NORMALS_NEAR = 8
 _CELL_OF_TEXEL = 0.75  # a level's cells are at most so large
 _SIGMA_OF_SPACING = 0.5  # narrow enough for letters a few points wide
 _SIGMA_OF_TEXEL = 0.4
@@ -76,7 +78,8 @@ def color_index(cloud: PointCloud, oriented: OrientedCloud, finest_texel_m: floa
 
     Args:
         cloud: Every point kept by cleaning; n points.
-        oriented: The points with normals; each point of ``cloud`` takes the nearest one's.
+        oriented: The points with normals; each point of ``cloud`` takes that of the nearest one
+            that its station saw.
         finest_texel_m: Detail below half of it is averaged away.
 
     Returns:
@@ -88,11 +91,11 @@ def color_index(cloud: PointCloud, oriented: OrientedCloud, finest_texel_m: floa
     if not len(cloud) or not len(oriented.cloud):
         raise StageError("bake: expected a cloud of at least 1 point, found 0")
     cell_m = finest_texel_m / 2
-    points, colors = _averaged(
-        cloud.points, np.zeros(len(cloud), np.int64), cell_m, cloud.points, cloud.colors
+    own = _normals(cloud, oriented)
+    points, normals, colors = _averaged(
+        cloud.points, _facing(own), cell_m, cloud.points, own, cloud.colors
     )
-    nearest = cKDTree(oriented.cloud.points, leafsize=_LEAF_POINTS).query(points)[1]
-    normals = oriented.normals[nearest]
+    normals = unit(normals)
     levels = [_level(cell_m, points, normals, colors)]
     while cell_m < _LARGEST_CELL_M:
         cell_m *= 2
@@ -102,6 +105,24 @@ def color_index(cloud: PointCloud, oriented: OrientedCloud, finest_texel_m: floa
         points, normals, colors = fewer[0], unit(fewer[1]), fewer[2]
         levels.append(_level(cell_m, points, normals, colors))
     return ColorIndex(tuple(levels))
+
+
+def _normals(cloud: PointCloud, oriented: OrientedCloud) -> Float32:
+    """(n, 3) for each point the normal of the nearest one of its own station, if any is near.
+
+    A station sees one side of a thin board: the nearest of all may lie on the other.
+    """
+    tree = cKDTree(oriented.cloud.points, leafsize=_LEAF_POINTS)
+    nearest = tree.query(cloud.points)[1]
+    station = oriented.cloud.station
+    others = np.flatnonzero(station[nearest] != cloud.station)
+    count = min(_NORMALS_NEAR, len(station))
+    for start in range(0, len(others), _POINTS_AT_ONCE):
+        some = others[start : start + _POINTS_AT_ONCE]
+        near = tree.query(cloud.points[some], k=np.arange(1, count + 1))[1]
+        first = (station[near] == cloud.station[some, None]).argmax(1)[:, None]
+        nearest[some] = np.take_along_axis(near, first, 1)[:, 0]
+    return oriented.normals[nearest]
 
 
 def _level(cell_m: float, points: Float32, normals: Float32, colors: Float32) -> Level:
