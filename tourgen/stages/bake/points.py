@@ -113,7 +113,7 @@ def _normals(cloud: PointCloud, oriented: OrientedCloud) -> Float32:
     A station sees one side of a thin board: the nearest of all may lie on the other.
     """
     tree = cKDTree(oriented.cloud.points, leafsize=_LEAF_POINTS)
-    nearest = tree.query(cloud.points)[1]
+    nearest = np.asarray(tree.query(cloud.points)[1], np.int64)
     station = oriented.cloud.station
     others = np.flatnonzero(station[nearest] != cloud.station)
     count = min(_NORMALS_NEAR, len(station))
@@ -122,7 +122,8 @@ def _normals(cloud: PointCloud, oriented: OrientedCloud) -> Float32:
         near = tree.query(cloud.points[some], k=np.arange(1, count + 1))[1]
         first = (station[near] == cloud.station[some, None]).argmax(1)[:, None]
         nearest[some] = np.take_along_axis(near, first, 1)[:, 0]
-    return oriented.normals[nearest]
+    normals: Float32 = oriented.normals[nearest]
+    return normals
 
 
 def _level(cell_m: float, points: Float32, normals: Float32, colors: Float32) -> Level:
