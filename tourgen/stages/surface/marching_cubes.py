@@ -32,10 +32,8 @@ CELL_CORNERS: Keys = np.array(
     [(c & 1) * STEPS[0] + (c >> 1 & 1) * STEPS[1] + (c >> 2) for c in range(8)]
 )
 """From a cell's lowest corner to each; bit 0 of a corner's number is x, 1 y, 2 z."""
-AROUND: Keys = np.array(
-    [np.dot(way, STEPS) for way in product((-1, 0, 1), repeat=3) if way != (0, 0, 0)]
-)
-"""From a corner's key to those of its 26 neighbours."""
+AROUND: Keys = np.array([np.dot(way, STEPS) for way in product((-1, 0, 1), repeat=3)])
+"""From a corner's key to those of all within a cell of it, itself included."""
 _EDGES = [(c, c | 1 << axis) for axis in range(3) for c in range(8) if not c >> axis & 1]
 _MOST_LOOPS = 4
 _LONGEST_LOOP = 7

@@ -62,9 +62,11 @@ from tourgen.stages.surface.tangent_planes import (
     tangent_planes,
 )
 
-VERSION = 1
-_STEEPEST = 1.2
-"""Most change of the distance over the way; a little more than 1 for the blend."""
+VERSION = 2
+_STEEPEST = 1.8
+"""Most change of the distance over the way: 1, and more for the blend and for what was hardly seen.
+At 1.2 edges gape of which one side was (chamber1: 98.97 instead of 99.24 % of what is seen within
+10 mm); the 95th percentile is 2.5 instead of 3.1 mm."""
 
 
 @dataclass(frozen=True, slots=True)
