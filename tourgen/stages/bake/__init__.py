@@ -34,7 +34,7 @@ __all__ = [
     "vistas",
 ]
 
-VERSION = 4
+VERSION = 5
 
 
 def bake(

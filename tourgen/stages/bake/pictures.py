@@ -4,9 +4,10 @@ A pixel is a sample as a point is: pixels of several pictures lie between one an
 the points, so that all together tell finer detail than the finest alone. All are blended by one
 bell as narrow as their joint density allows, each weighted by its distance along the surface.
 
-What a source shows is believed as far as it agrees, in means of 60 mm, with the one of median
-brightness, weighted by trust: a passer-by, a highlight, a surface beside the right one lose their
-weight. Means are compared since samples differ beside any edge, and rightly.
+What a source shows is believed as far as it agrees, in means of 60 and of 200 mm, with the one of
+median brightness, weighted by trust: a passer-by, a highlight, a surface beside the right one lose
+their weight. Means are compared since samples differ beside any edge, and rightly; the wider ones
+because a dark coat agrees with what is dark behind it, but not with all that is about it.
 
 PSNR over 15,000 pixels of ten views of the demo's first chamber where the surface stands right,
 kernels evaluated without texels between: points alone 23.96 dB; the blend before this one, in which
@@ -31,7 +32,7 @@ from tourgen.stages.bake.vista import Vista
 _TEXELS_AT_ONCE = 100_000
 _POINTS_VOTE = 0.8
 _APART = 20.0  # of 255
-_TOLD_M = 0.06  # edge of the means in which sources are compared
+_TOLD_M = (0.06, 0.2)  # edges of the means in which sources are compared
 _LEAST = 1e-6  # weight of the points where nothing tells
 
 
@@ -84,16 +85,20 @@ def believed(
     """(1 + v, b) how far the points and each picture agree with most of the evidence, by block."""
     blocks = texels.blocks()
     none = np.zeros(len(blocks.row), np.float32)
-    shown = [of_points(blocks, index, _TOLD_M, settings, none).colors]
-    vote = [np.full(len(none), _POINTS_VOTE, np.float32)]
-    for each in vistas:
-        sight = each.look(blocks.positions, blocks.normals)
-        shown.append(np.zeros_like(shown[0]))
-        vote.append(none.copy())
-        width = np.full(len(sight.which), _TOLD_M / 2, np.float32)
-        shown[-1][sight.which] = each.read(sight, width, _TOLD_M)[0]
-        vote[-1][sight.which] = sight.trust
-    return agreement(np.stack(shown), np.stack(vote))
+    sights = [each.look(blocks.positions, blocks.normals) for each in vistas]
+    vote = np.zeros((1 + len(vistas), len(none)), np.float32)
+    vote[0] = _POINTS_VOTE
+    for own, sight in zip(vote[1:], sights, strict=True):
+        own[sight.which] = sight.trust
+    trust = np.ones_like(vote)
+    for told_m in _TOLD_M:
+        shown = np.zeros((*vote.shape, 3), np.float32)
+        shown[0] = of_points(blocks, index, told_m, settings, none).colors
+        for own, each, sight in zip(shown[1:], vistas, sights, strict=True):
+            width = np.full(len(sight.which), told_m / 2, np.float32)
+            own[sight.which] = each.read(sight, width, told_m)[0]
+        trust *= agreement(shown, vote)
+    return trust
 
 
 def agreement(shown: Float32, vote: Float32) -> Float32:
