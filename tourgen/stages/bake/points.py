@@ -1,4 +1,15 @@
-"""The colours of points, averaged in cells that double in size, and blended at texels."""
+"""The colours of points, averaged in cells that double in size, and blended at texels.
+
+What limits the picture is the points' spacing: at 11 mm, on the demo's first chamber with inlays
+of some millimetres, the truth's own colours in place of the scanned ones gain 0.07 dB, texels half
+as large again 0.03 dB. Other kernels over 5,000 pixels of ten views where the surface stands right
+(23.74 dB with this one, points without cells), rejected as not worth their time:
+
+    bell of 0.25, 0.35, 0.6 of the spacing            -0.6, -0.3, +0.1 dB (letters blur)
+    local linear regression, 8, 12, 16 neighbours     +0.10, +0.15, +0.18 dB
+    steering kernels (Takeda, Farsiu, Milanfar 2007),
+    structure tensors of 12 neighbours, 12 or 24 taps +0.27, +0.34 dB, and tensors of all points
+"""
 
 from __future__ import annotations
 
