@@ -31,7 +31,7 @@ from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64
 
-VERSION = 1
+VERSION = 2
 _TURN = 2j * np.pi
 _HIGHEST_DEG = 75.0
 """Windows nearer the zenith hold all azimuths."""
@@ -161,26 +161,29 @@ def ownership(points: Float32, stations: Float64, settings: Settings) -> Ownersh
         settings: See ``Settings``.
 
     Returns:
-        The owner of each point and the stations' exact places. Owners are told only where the
-        grid of every station is found and nearly all points lie on one; the few that lie on
-        none follow the nearest that does.
+        The stations' exact places where the grid of each is found, else those given; and the owner
+        of each point where moreover nearly all points lie on a grid. The few that lie on none
+        follow the nearest that does.
     """
     rng = np.random.default_rng(0)
-    grids = [_grid(points, place, settings, rng) for place in stations]
-    places = [grid.place if grid else place for grid, place in zip(grids, stations, strict=True)]
-    refined = np.array(places, np.float64).reshape(-1, 3)
-    found = [grid for grid in grids if grid is not None]
-    nobody = Ownership(np.full(len(points), -1, np.int16), refined)
-    if not found or len(found) < len(grids):
-        return nobody
+    nobody = np.full(len(points), -1, np.int16)
+    found = []
+    for place in stations:
+        grid = _grid(points, place, settings, rng)
+        if grid is None:
+            return Ownership(nobody, stations)
+        found.append(grid)
+    if not found:
+        return Ownership(nobody, stations)
+    places = np.array([grid.place for grid in found])
     owner = _nearest_grid(points, found, settings.most_off)
     known = owner >= 0
     if known.mean() < settings.least_matched:
-        return nobody
+        return Ownership(nobody, places)
     if not known.all():
         _, near = cKDTree(points[known]).query(points[~known], workers=-1)
         owner[~known] = owner[known][near]
-    return Ownership(owner, refined)
+    return Ownership(owner, places)
 
 
 def _nearest_grid(points: Float32, grids: list[_Grid], most_off: float) -> npt.NDArray[np.int16]:
