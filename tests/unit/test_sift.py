@@ -21,6 +21,11 @@ TABLE = solid([-0.4, 0.9, 0.6], [0.6, 1.5, 0.75])
 WALLS = inside(*ROOM)
 
 
+def rows(cloud: PointCloud) -> np.ndarray:
+    """One value a point."""
+    return np.ascontiguousarray(cloud.points).view(np.dtype((np.void, 12))).reshape(-1)
+
+
 def kept(cloud: PointCloud, sifted: sift.Sifted) -> np.ndarray:
     """Mask of the points left."""
     left = {row.tobytes() for row in sifted.cloud.points}
@@ -184,6 +189,11 @@ def test_a_mirrored_room_goes_and_one_behind_a_window_stays(glass: str) -> None:
     if glass == "mirror":
         assert left[seen_behind].mean() < 0.01
         assert sifted.removed["reflected"] > 0.9 * seen_behind.sum()
+        fresh = ~np.isin(rows(sifted.cloud), rows(cloud))
+        on_glass = sifted.cloud.points[fresh]
+        assert fresh.sum() > 0.9 * seen_behind.sum(), "each beam ends on the glass instead"
+        assert np.abs(on_glass[:, 1] - high[1]).max() < 0.01
+        assert (np.abs(on_glass[:, [0, 2]] - [0, 1.5]) < [0.65, 0.55]).all()
     else:
         assert sifted.removed["reflected"] == 0
     merged = cloud_of(parts, merged=True)

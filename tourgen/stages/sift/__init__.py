@@ -26,7 +26,7 @@ known who measured a point, only a third of the mixed pixels go, and no passer-b
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -40,7 +40,7 @@ from tourgen.stages.sift.strays import clusters, islands, isolated
 from tourgen.stages.sift.through import passed
 from tourgen.stages.sift.views import View, views
 
-VERSION = 2
+VERSION = 3
 Mask = npt.NDArray[np.bool_]
 
 
@@ -76,7 +76,7 @@ class Sifted:
 
     Attributes:
         cloud: The kept points in their order.
-        removed: How many points went, by cause.
+        removed: How many points went, by cause; those reflected went onto the mirror.
     """
 
     cloud: PointCloud
@@ -96,7 +96,7 @@ def sift(cloud: PointCloud, stations: Float64, settings: Settings) -> Sifted:
         InputError: Fewer than ``min_points`` points, before or after.
     """
     _require(len(cloud), settings.min_points, "")
-    left, reflected = _without(cloud, _reflected(cloud, stations, settings))
+    left, reflected = _without_reflections(cloud, stations, settings)
     left, gone = _without(left, _passed(left, stations, settings))
     seen = list(views(left, stations))
     lonely = mixed(left.points, seen, settings.mixed_m)
@@ -122,11 +122,18 @@ def _smooth(count: int, seen: list[View]) -> Mask:
     return found
 
 
-def _reflected(cloud: PointCloud, stations: Float64, settings: Settings) -> Mask:
+def _without_reflections(
+    cloud: PointCloud, stations: Float64, settings: Settings
+) -> tuple[PointCloud, int]:
     if not len(stations):
-        return np.zeros(len(cloud), np.bool_)
+        return cloud, 0
     cluster = clusters(cloud.points, settings.island_gap_m)
-    return reflections(cloud.points, cluster, list(views(cloud, stations)), settings.behind_m)
+    seen = list(views(cloud, stations))
+    found = reflections(cloud.points, cluster, seen, settings.behind_m)
+    points = cloud.points.copy()
+    points[found.moved] = found.onto
+    left, gone = _without(replace(cloud, points=points), found.gone)
+    return left, gone + len(found.moved)
 
 
 def _passed(cloud: PointCloud, stations: Float64, settings: Settings) -> Mask:

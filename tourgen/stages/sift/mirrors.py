@@ -5,7 +5,9 @@ the room, seen from each station through one patch of a wall. Whether that patch
 window is told by folding the cluster back: reflected at the mirror's plane it falls onto the room.
 The plane starts from the points around the patch in the station's picture, the mirror's frame, and
 is moved until the two agree best. Then all goes that lies behind the glass on a beam through it,
-also what is too near the wall to be a cluster apart.
+also what is too near the wall to be a cluster apart: onto the glass, where each beam met it, so
+that the mirror becomes a surface that shows what it showed to the scanner, and no hole in the wall.
+Only where it is not told which station measured a point, it is dropped.
 """
 
 from __future__ import annotations
@@ -57,11 +59,30 @@ class Mirror:
         depth = (points - self.place) @ self.normal
         behind = (depth < -behind_m) & (start > 0)
         at = np.flatnonzero(behind)
-        share = start / (start - depth[at])
-        crossing = station + share[:, None] * (points[at] - station) - self.place
-        flat = crossing @ self.across.T
+        flat = (self.crossing(station, points[at]) - self.place) @ self.across.T
         behind[at] = (flat @ self.outline[:, :2].T + self.outline[:, 2] <= 0).all(axis=1)
         return behind
+
+    def crossing(self, station: Float64, points: Float32) -> Float64:
+        """(n, 3) where the beams from a station to (n, 3) points behind the glass pass it."""
+        start = (station - self.place) @ self.normal
+        share = start / (start - (points - self.place) @ self.normal)
+        return np.asarray(station + share[:, None] * (points - station))
+
+
+@dataclass(frozen=True, slots=True)
+class Reflections:
+    """What lies behind mirrors.
+
+    Attributes:
+        gone: (n,) mask of the points to drop.
+        moved: (k,) numbers of the points to move.
+        onto: (k, 3) metres, where to.
+    """
+
+    gone: Mask
+    moved: npt.NDArray[np.int64]
+    onto: Float32
 
 
 def reflections(
@@ -69,8 +90,8 @@ def reflections(
     cluster: npt.NDArray[np.int32],
     seen: Sequence[View],
     behind_m: float,
-) -> Mask:
-    """Mask of the points that lie behind mirrors.
+) -> Reflections:
+    """The points that lie behind mirrors.
 
     Args:
         points: (n, 3) metres.
@@ -79,6 +100,7 @@ def reflections(
         behind_m: What lies less behind the glass is not told from it.
     """
     gone = np.zeros(len(points), np.bool_)
+    moved, onto = [np.empty(0, np.int64)], [np.empty((0, 3), np.float32)]
     room = np.flatnonzero(cluster == 0)
     rng = np.random.default_rng(0)
     tree = cKDTree(points[rng.choice(room, min(len(room), _ROOM_POINTS), replace=False)])
@@ -104,8 +126,14 @@ def reflections(
             hidden = mirror.hides(each.station, points[each.index], behind_m)
             # Another station may have measured a wall there, where it is not told which did.
             hidden &= each.told | (cluster[each.index] > 0)
+            fresh = each.index[hidden & each.told]
+            fresh = fresh[~gone[fresh]]
+            moved.append(fresh)
+            onto.append(mirror.crossing(each.station, points[fresh]).astype(np.float32))
             gone[each.index[hidden]] = True
-    return gone
+    at = np.concatenate(moved)
+    gone[at] = False
+    return Reflections(gone, at, np.concatenate(onto))
 
 
 def _apart(
