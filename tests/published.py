@@ -151,9 +151,16 @@ def without_draco(data: bytes) -> bytes:
                 accessor = document["accessors"][number]
                 accessor["bufferView"] = len(pieces)
                 kind = _COMPONENTS[accessor["componentType"]]
-                pieces.append(np.ascontiguousarray(values).astype(kind).tobytes())
-                target = 34963 if number == primitive["indices"] else 34962
-                views.append({"buffer": 0, "target": target})
+                values = np.ascontiguousarray(values).astype(kind)
+                if number == primitive["indices"]:
+                    views.append({"buffer": 0, "target": 34963})
+                else:
+                    values = values.reshape(len(values), -1)
+                    gap = -values.shape[1] % (4 // values.itemsize)  # each begins on four bytes
+                    values = np.pad(values, ((0, 0), (0, gap)))
+                    stride = {"byteStride": values.shape[1] * values.itemsize} if gap else {}
+                    views.append({"buffer": 0, "target": 34962, **stride})
+                pieces.append(values.tobytes())
     return _repacked(document, pieces)
 
 

@@ -214,6 +214,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         picture.unwrapped,
         tree,
         cleaned,
+        scanned,
         settings=picture.Texels(room.texture.texel_mm),
         version=unwrap.VERSION,
         libraries=("xatlas", "scipy"),

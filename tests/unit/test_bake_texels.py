@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from surfaces import sheet
 
-from tourgen.fitting.picture import Texels, unwrapped, unwrapped_for_pictures
+from tourgen.fitting.picture import Texels, unwrapped
 from tourgen.fitting.points import RoomScan
 from tourgen.geometry import Panorama, PointCloud, Tile
 from tourgen.scans import ReadFacts
@@ -34,8 +36,8 @@ def scan() -> RoomScan:
 def test_a_picture_nearer_than_the_points_makes_texels_finer() -> None:
     given = scan()
     room = (Tile("r", sheet(1.0, 1.0, 8), 0.0, ()),)
-    (bare,) = unwrapped(room, given.cloud, Texels(1.0))
-    (fine,) = unwrapped_for_pictures(room, given.cloud, given, Texels(1.0))
+    (bare,) = unwrapped(room, given.cloud, replace(given, panoramas=()), Texels(1.0))
+    (fine,) = unwrapped(room, given.cloud, given, Texels(1.0))
     pixel_m = 1.6 * np.pi / 1024  # 1.6 m: the mean way to the sheet
     together_m = 1 / np.sqrt(1 / SPACING_M**2 + 1 / pixel_m**2)
     assert bare.texel_m == pytest.approx(SPACING_M / 2, rel=0.15)
@@ -45,5 +47,5 @@ def test_a_picture_nearer_than_the_points_makes_texels_finer() -> None:
 def test_no_texel_is_finer_than_asked_for() -> None:
     given = scan()
     room = (Tile("r", sheet(1.0, 1.0, 8), 0.0, ()),)
-    (fine,) = unwrapped_for_pictures(room, given.cloud, given, Texels(4.0))
+    (fine,) = unwrapped(room, given.cloud, given, Texels(4.0))
     assert fine.texel_m == pytest.approx(0.004)

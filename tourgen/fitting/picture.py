@@ -98,20 +98,8 @@ def entering(start: Viewpoint | None) -> Entering:
     return Entering(start.position, start.look_at) if start else Entering(None, None)
 
 
-def unwrapped(room: tuple[Tile, ...], cloud: PointCloud, asked: Texels) -> tuple[UvMesh, ...]:
-    """Unwrap each tile of a room that points alone will colour."""
-    return _unwrapped(room, cloud, (), asked)
-
-
-def unwrapped_for_pictures(
+def unwrapped(
     room: tuple[Tile, ...], cloud: PointCloud, scan: RoomScan, asked: Texels
-) -> tuple[UvMesh, ...]:
-    """Unwrap each tile of a room that its scan's panoramas, if any, will colour too."""
-    return _unwrapped(room, cloud, scan.panoramas, asked)
-
-
-def _unwrapped(
-    room: tuple[Tile, ...], cloud: PointCloud, panoramas: tuple[Panorama, ...], asked: Texels
 ) -> tuple[UvMesh, ...]:
     """Unwrap each tile.
 
@@ -119,7 +107,7 @@ def _unwrapped(
     nearest panorama's pixels, down to the size asked for; a branch's are twice those below it; the
     root's make a picture of a fixed size.
     """
-    texel_m = _texels(room, cKDTree(cloud.points), panoramas, asked.texel_mm / 1000)
+    texel_m = _texels(room, cKDTree(cloud.points), scan.panoramas, asked.texel_mm / 1000)
     return tuple(unwrap.unwrap(tile.mesh, unwrap.Settings(texel_m[tile.id])) for tile in room)
 
 
