@@ -10,7 +10,14 @@ import trimesh
 from tourgen.errors import StageError
 from tourgen.geometry import Mesh, OrientedCloud, PointCloud
 from tourgen.stages import hygiene, levels, measure, trim
-from tourgen.stages.mesh_arrays import components, face_adjacency, face_areas, weld
+from tourgen.stages.mesh_arrays import (
+    STEP_M,
+    components,
+    face_adjacency,
+    face_areas,
+    on_grid,
+    weld,
+)
 from tourgen.stages.surface import poisson
 
 STATION = np.array([[0.3, 0.2, 1.5]])
@@ -203,3 +210,13 @@ def test_welding_joins_what_lies_at_one_place() -> None:
     joined = weld(parts)
     assert len(joined.vertices) == 8
     assert trimesh.Trimesh(joined.vertices, joined.faces, process=False).is_watertight
+
+
+def test_a_spike_without_width_is_gone_before_it_is_published() -> None:
+    plane = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    spike = np.float32([[0.5, 0.5, 0], [0.5, 0.5 + STEP_M / 4, 0], [0.5, 0.5, 0.03]])
+    faces = np.int32([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [4, 5, 6], [5, 4, 6]])
+    found = on_grid(Mesh(np.zeros(3), np.concatenate([plane, spike]), faces))
+    assert len(found.faces) == 4
+    assert found.vertices[:, 2].max() == 0
+    np.testing.assert_array_equal(found.vertices % STEP_M, 0)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tourgen.geometry import Mesh
-from tourgen.stages.mesh_arrays import face_areas
+from tourgen.stages.mesh_arrays import face_areas, on_grid
 
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +54,8 @@ def _simplify(mesh: Mesh, faces: int) -> Mesh:
     import fast_simplification
 
     if len(mesh.faces) <= faces:
-        return mesh
+        return on_grid(mesh)
     vertices, triangles = fast_simplification.simplify(
         mesh.vertices, mesh.faces, target_count=faces, agg=5
     )
-    return Mesh(mesh.origin, vertices.astype(np.float32), triangles.astype(np.int32))
+    return on_grid(Mesh(mesh.origin, vertices.astype(np.float32), triangles.astype(np.int32)))

@@ -9,6 +9,21 @@ from scipy.sparse.csgraph import connected_components
 
 from tourgen.geometry import Int32, Mesh
 
+STEP_M = 2.0**-12
+"""Of the grid that published vertices lie on, 0.244 mm: a float32 holds its positions exactly."""
+
+
+def on_grid(mesh: Mesh) -> Mesh:
+    """The mesh with its vertices on the grid, without the faces that have no area there.
+
+    Simplification leaves slivers, some of them the two sides of a spike; what would vanish when
+    published is better gone before borders and pictures are made.
+    """
+    vertices = np.rint(mesh.vertices.astype(np.float64) / STEP_M) * STEP_M
+    joined = weld([Mesh(mesh.origin, vertices.astype(np.float32), mesh.faces)])
+    apart = np.all(joined.faces != np.roll(joined.faces, 1, axis=1), axis=1)
+    return compact(joined, apart)
+
 
 def compact(mesh: Mesh, keep: npt.NDArray[np.generic]) -> Mesh:
     """The faces that ``keep`` (a mask or positions) selects, without unused vertices."""

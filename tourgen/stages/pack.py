@@ -18,13 +18,13 @@ import numpy as np
 
 from tourgen import __version__
 from tourgen.errors import StageError
+from tourgen.stages.mesh_arrays import STEP_M
 
 if TYPE_CHECKING:
     from tourgen.geometry import Float32, Float64, Int32, TexturedMesh, UInt8, UvMesh
 
 VERSION = 3
 
-STEP_M = 2.0**-12
 _MOST_BITS = 24  # a float32 holds no more
 _TEXELS_OF_STEP = 0.25
 _UNSIGNED_BYTE, _UNSIGNED_INT, _FLOAT = 5121, 5125, 5126

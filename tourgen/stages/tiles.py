@@ -18,9 +18,9 @@ import numpy.typing as npt
 
 from tourgen.geometry import Mesh, Tile
 from tourgen.stages.levels import Levels
-from tourgen.stages.mesh_arrays import compact, components, face_adjacency, weld
+from tourgen.stages.mesh_arrays import compact, components, face_adjacency, on_grid, weld
 
-VERSION = 2
+VERSION = 3
 _ISLAND_FACES = 60
 _IDS = "0123456789abcdefghijklmnopqrstuvwxyz"
 
@@ -140,7 +140,7 @@ def _simplify_locked(mesh: Mesh, ratio: float) -> Mesh:
         agg=5,
         preserve_border=True,
     )
-    return Mesh(mesh.origin, vertices.astype(np.float32), faces.astype(np.int32))
+    return on_grid(Mesh(mesh.origin, vertices.astype(np.float32), faces.astype(np.int32)))
 
 
 def _deviation_m(fine: Mesh, coarse: Mesh) -> float:

@@ -32,9 +32,13 @@ from tourgen.stages.mesh_arrays import (
     face_adjacency,
     face_areas,
     vertex_areas,
+    vertex_normals,
 )
 
-VERSION = 4
+VERSION = 5
+_ALIKE = 0.5
+"""Cosine between a pane and its rest, at least."""
+
 Mask = npt.NDArray[np.bool_]
 
 
@@ -101,11 +105,11 @@ def trim(mesh: Mesh, oriented: OrientedCloud, full: PointCloud, settings: Settin
     if not opening.all():
         shut = np.flatnonzero(~opening)
         behind = replace(free, margin_m=settings.back_margin_m)
-        drawn, skin = without_bulges(mesh, at[shut], region[shut], behind, settings.support_m)
-        cut[shut[skin]] = True
+        drawn, floating = without_bulges(mesh, at[shut], region[shut], behind, settings.support_m)
+        cut[shut[floating]] = True
     gone = np.zeros(len(mesh.vertices), bool)
     gone[at[cut]] = True
-    gone |= _rim(mesh.vertices, distance_m, gone, settings.support_m)
+    gone |= _rim(mesh, distance_m, gone, settings.support_m)
     return _without_patches(drawn, loose, gone, 0.0)
 
 
@@ -130,10 +134,23 @@ def _regions(mesh: Mesh, at: npt.NDArray[np.int64]) -> npt.NDArray[np.int32]:
     return components(pair[np.all(pair >= 0, axis=1)], len(at))
 
 
-def _rim(vertices: Float32, distance_m: Float64, gone: Mask, support_m: float) -> Mask:
-    """The hardly supported vertices around an opening: what is left of its pane."""
+def _rim(mesh: Mesh, distance_m: Float64, gone: Mask, support_m: float) -> Mask:
+    """The hardly supported vertices around an opening that look as it does: its pane's rest.
+
+    The reveal of a window, which may be as hardly supported, looks across it.
+    """
     rim = np.isfinite(distance_m) & (distance_m > support_m / 2)
-    rim[rim] = np.isfinite(_distance_m(vertices[rim], vertices[gone], support_m))
+    if not gone.any() or not rim.any():
+        return np.zeros(len(rim), bool)
+    at, cut = np.flatnonzero(rim), np.flatnonzero(gone)
+    distance, near = cKDTree(mesh.vertices[cut]).query(
+        mesh.vertices[at], distance_upper_bound=support_m, workers=-1
+    )
+    normal = vertex_normals(mesh)
+    found = np.isfinite(distance)
+    at, near = at[found], cut[np.asarray(near)[found]]
+    rim = np.zeros(len(rim), bool)
+    rim[at[np.einsum("ij,ij->i", normal[at], normal[near]) > _ALIKE]] = True
     return rim
 
 

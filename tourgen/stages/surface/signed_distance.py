@@ -62,7 +62,7 @@ from tourgen.stages.surface.tangent_planes import (
     tangent_planes,
 )
 
-VERSION = 2
+VERSION = 3
 _STEEPEST = 1.8
 """Most change of the distance over the way: 1, and more for the blend and for what was hardly seen.
 At 1.2 edges gape of which one side was (chamber1: 98.97 instead of 99.24 % of what is seen within
@@ -165,11 +165,14 @@ class Distances:
         field: What tells it.
         key: (n,) of the corners, sorted; see ``marching_cubes``.
         value: (n,) metres, NaN where it is unknown.
+        steepest: Most change of the distance over the way; where it changes by more there is no
+            surface.
     """
 
     field: Field
     key: Keys
     value: Float32
+    steepest: float
 
     def zero_set(self, origin: Float64) -> Mesh:
         """Where the distance is zero; no faces where it nowhere is."""
@@ -180,7 +183,7 @@ class Distances:
             low,
             cell_m,
             origin,
-            steepest=_STEEPEST,
+            steepest=self.steepest,
             normals=self.field.normal,
         )
 
@@ -200,7 +203,7 @@ class Distances:
         value = self.value.copy()
         value[rim] = told(self.key[rim])
         seeds = np.concatenate([field.seeds, field.cells(beyond.seeds)])
-        return _grown(field, told, seeds, self.key, value)
+        return _grown(field, told, seeds, self.key, value, np.inf)
 
 
 def distances(planes: TangentPlanes, settings: Settings) -> Distances:
@@ -214,14 +217,19 @@ def distances(planes: TangentPlanes, settings: Settings) -> Distances:
         settings.blend,
     )
     nothing = np.empty(0, np.int64), np.empty(0, np.float32)
-    return _grown(field, field.distance, field.seeds, *nothing)
+    return _grown(field, field.distance, field.seeds, *nothing, _STEEPEST)
 
 
 def _grown(
-    field: Field, told: Callable[[Keys], Float32], seeds: Keys, key: Keys, value: Float32
+    field: Field,
+    told: Callable[[Keys], Float32],
+    seeds: Keys,
+    key: Keys,
+    value: Float32,
+    steepest: float,
 ) -> Distances:
-    most_m = float(np.sqrt(2) * _STEEPEST * field.cell_m)
-    return Distances(field, *grown(told, seeds, key, value, most_m))
+    most_m = float(np.sqrt(2) * steepest * field.cell_m)
+    return Distances(field, *grown(told, seeds, key, value, most_m), steepest)
 
 
 class Beyond(Protocol):
