@@ -34,6 +34,8 @@ RIM_PX = 4
 OUTLINE = 3
 """Outlines before a true opening may move by so many geometric errors of the coarse tiles, which
 are 95th percentiles; the worst found was 2.5 (the bed's cornice in the miniature)."""
+THIN_M = 0.05
+"""Depth, along the ray, of what counts as thin."""
 BEYOND_PX = 40
 """Openings are known so far beyond the picture's edges."""
 PIXEL_RAD = np.radians(UPRIGHT_DEG) / SIZE[1]
@@ -88,13 +90,22 @@ class TruthRoom:
         return bool(np.isfinite(hits).mean() > 0.75)
 
     def void(self, eye: Vector, look_at: Vector, rim_m: float) -> Bools:
-        """The pixels in which no surface need be, and those so near to them."""
+        """The pixels in which no surface need be, and those so near to them.
+
+        Through an opening one may also see where something thin stands before it: a rail of two
+        centimetres has gaps in the miniature, which are no holes of the room.
+        """
         cast = rays(eye, look_at, SIZE, BEYOND_PX)
+        length = np.linalg.norm(cast[..., 3:], axis=2)
         hit = self.scene.cast_rays(o3d.core.Tensor(cast))["t_hit"].numpy()
+        behind = cast.copy()
+        past = np.where(np.isfinite(hit), hit + THIN_M / length, 0)
+        behind[..., :3] += past[..., None] * cast[..., 3:]
+        farther = past + self.scene.cast_rays(o3d.core.Tensor(behind))["t_hit"].numpy()
         out = ~np.isfinite(hit)
         for opening in self.doors_and_windows:
-            out |= through(opening, cast, hit)
-        distance_m = hit * np.linalg.norm(cast[..., 3:], axis=2)
+            out |= through(opening, cast, hit) | through(opening, cast, farther)
+        distance_m = hit * length
         rim_px = np.maximum(RIM_PX, rim_m / (distance_m * PIXEL_RAD))
         void: Bools = distance_transform_edt(~out) <= rim_px
         return void[BEYOND_PX:-BEYOND_PX, BEYOND_PX:-BEYOND_PX]

@@ -42,7 +42,8 @@ def without_bulges(
         at: (k,) vertices that do.
         region: (k,) number of the connected region that each lies in.
         free: What is known to be empty.
-        apart_m: A bulge that comes to rest less in front of the surface is a skin of it.
+        apart_m: A bulge that comes to rest less in front of the surface is a skin of it. One no
+            larger than a square of this edge stays: the unseen side of a rod is no bulge.
 
     Returns:
         The mesh, and the mask of the vertices ``at`` that hang on nothing and were left.
@@ -52,10 +53,11 @@ def without_bulges(
     floating = np.isnan(film[:, 0])
     empty = floating.copy()
     empty[~floating] = free.holds(film[~floating])
-    bulge = np.flatnonzero(mostly(empty, region, area_m2) & ~floating)
+    worth = (np.bincount(region, area_m2) > apart_m**2)[region] & ~floating
+    bulge = np.flatnonzero(mostly(empty, region, area_m2) & worth)
     back_m = _way_back(mesh, at[bulge], free, apart_m)
     deep = ~mostly(np.isnan(back_m), region[bulge], area_m2[bulge])
-    tight = ~floating
+    tight = worth.copy()
     tight[bulge[deep]] = False
     vertices = mesh.vertices.copy()
     vertices[at[tight]] = film[tight]

@@ -35,7 +35,7 @@ from tourgen.stages.mesh_arrays import (
     vertex_normals,
 )
 
-VERSION = 5
+VERSION = 6
 _ALIKE = 0.5
 """Cosine between a pane and its rest, at least."""
 
