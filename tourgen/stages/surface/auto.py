@@ -2,14 +2,15 @@
 
 Near points, Hoppe's distance draws flat walls flat and edges sharp, and costs little; it ends where
 the points do. The solve closes every gap smoothly, but rounds every edge off and costs most of a
-build at the same detail. So the solve is made with
-coarser cells, from points spread evenly over the surface that the distance drew, and its surface
-goes on where the distance is unknown: there is one field, and one watertight mesh.
+build at the same detail. So the solve is made with coarser cells, from points spread evenly over
+the surface that the distance drew. Over the last part of a plane's reach the distance fades into
+that to the solved surface: there is one field, and one watertight mesh.
 
 Tried: the solve from the tangent planes themselves. A board of 25 mm whose one side is seen at a
 grazing angle only, with its points in sparse rows, dissolved, and the surface bulged out into the
 room (chamber1: 98.6 instead of 99.0 % of what is seen within 10 mm, 3.7 instead of 2.9 mm at the
-95th percentile).
+95th percentile). The solve's distance wherever the planes' jumps: it is too coarse for edges (F-score
+at 5 mm 0.961 instead of 0.972). No surface where it jumps: edges gape, hundreds of pixels a view.
 
 Where most of a scan lies farther apart than planes reach, there is little that the distance could
 draw: then all of it is left to the solve, at full detail.
