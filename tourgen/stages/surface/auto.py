@@ -9,8 +9,8 @@ that to the solved surface: there is one field, and one watertight mesh.
 Tried: the solve from the tangent planes themselves. A board of 25 mm whose one side is seen at a
 grazing angle only, with its points in sparse rows, dissolved, and the surface bulged out into the
 room (chamber1: 98.6 instead of 99.0 % of what is seen within 10 mm, 3.7 instead of 2.9 mm at the
-95th percentile). The solve's distance wherever the planes' jumps: it is too coarse for edges (F-score
-at 5 mm 0.961 instead of 0.972). No surface where it jumps: edges gape, hundreds of pixels a view.
+95th percentile). The solve's distance wherever the planes' jumps: it is too coarse for edges (the
+F-score at 5 mm is 0.961 instead of 0.972). No surface where it jumps: edges gape.
 
 Where most of a scan lies farther apart than planes reach, there is little that the distance could
 draw: then all of it is left to the solve, at full detail.
