@@ -9,7 +9,7 @@ import trimesh
 
 from tourgen.errors import StageError
 from tourgen.geometry import Mesh, OrientedCloud, PointCloud
-from tourgen.stages import hygiene, levels, measure, trim
+from tourgen.stages import hygiene, levels, measure, specks, trim
 from tourgen.stages.mesh_arrays import (
     STEP_M,
     components,
@@ -174,6 +174,23 @@ def test_only_crumbs_is_an_error() -> None:
         hygiene.hygiene(
             Mesh(np.zeros(3), np.float32(ball.vertices), np.int32(ball.faces)), hygiene.Settings()
         )
+
+
+# ------------------------------------------------------------------ specks
+
+
+def test_what_hangs_in_the_air_on_a_few_strays_goes_and_a_lamp_stays(
+    oriented: OrientedCloud, solved: Mesh
+) -> None:
+    lamp = trimesh.creation.icosphere(3, 0.15).apply_translation([0.5, 1.0, 1.9])
+    blob = trimesh.creation.icosphere(3, 0.1).apply_translation([-0.5, -1.0, 1.2])
+    shapes = [Mesh(solved.origin, np.float32(s.vertices), np.int32(s.faces)) for s in (lamp, blob)]
+    hung = weld([solved, *shapes])
+    seen = lamp.sample(int(lamp.area * len(oriented.cloud) / face_areas(solved).sum() / 2), seed=0)
+    points = np.concatenate([oriented.cloud.points, seen, blob.vertices[[0, 100, 200]]])
+    kept = specks.without_specks(hung, np.float32(points), support_m=0.12)
+    assert len(kept.faces) == len(solved.faces) + len(lamp.faces)
+    assert not (np.linalg.norm(kept.vertices - blob.center_mass, axis=1) < 0.11).any()
 
 
 # ------------------------------------------------------------------ levels, measure

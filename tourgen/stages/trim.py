@@ -12,6 +12,8 @@ runs through space that a station knows to be empty, it is one of two:
 
 Where no station is known, gaps up to ``bridge_area_m2`` stay. Boxes of the tour file that are
 marked closed (mirrors, black screens: the scanner sees through those too) always stay.
+
+What then hangs in the air, borne by next to no point, goes too; see ``specks``.
 """
 
 from __future__ import annotations
@@ -34,8 +36,9 @@ from tourgen.stages.mesh_arrays import (
     vertex_areas,
     vertex_normals,
 )
+from tourgen.stages.specks import without_specks
 
-VERSION = 6
+VERSION = 7
 _ALIKE = 0.5
 """Cosine between a pane and its rest, at least."""
 
@@ -68,7 +71,7 @@ class Settings:
 
 
 def trim(mesh: Mesh, oriented: OrientedCloud, full: PointCloud, settings: Settings) -> Mesh:
-    """Open the openings, draw back the bulges.
+    """Open the openings, draw back the bulges, drop what hangs in the air.
 
     Args:
         mesh: The closed surface, faces counter-clockwise seen from the free space.
@@ -79,6 +82,11 @@ def trim(mesh: Mesh, oriented: OrientedCloud, full: PointCloud, settings: Settin
     Returns:
         The mesh without the faces that close openings.
     """
+    opened = _opened(mesh, oriented, full, settings)
+    return without_specks(opened, oriented.cloud.points, settings.support_m)
+
+
+def _opened(mesh: Mesh, oriented: OrientedCloud, full: PointCloud, settings: Settings) -> Mesh:
     distance_m = _distance_m(mesh.vertices, oriented.cloud.points, settings.support_m)
     distance_m[_in_boxes(mesh.vertices, settings)] = 0
     loose = np.isinf(distance_m)
