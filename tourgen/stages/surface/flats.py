@@ -1,0 +1,292 @@
+"""Flats: walls, floors and boards are planes, and their tangent planes are told so.
+
+Tangent planes carry what is left of the noise: a wall drawn from them ripples by a few degrees, and
+the line where two walls meet wanders by millimetres. Where many of them agree on one plane, that
+plane is known far better than any of them is. So planes are grown over *surfels*, means of a few
+neighbouring tangent planes (region growing with refits: Poppinga, Vaskevicius, Birk and Pathak
+2008), and every tangent plane that lies on one within the noise is moved onto it and takes its
+normal. So do those beside a crease whose normals, fitted across it, look along neither side: that
+is what makes creases straight.
+
+What bends is no plane: a patch is refused where a paraboloid fits it better by more than the noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import breadth_first_order
+from scipy.spatial import cKDTree
+
+from tourgen.geometry import Float64
+from tourgen.stages.mesh_arrays import components
+from tourgen.stages.surface.tangent_planes import TangentPlanes
+
+_SURFEL = 2.5
+"""Edge of the voxels whose tangent planes are averaged, in spacings."""
+_COHERENT = 0.985
+"""Length of the mean of a surfel's normals, at least."""
+_NEIGHBOURS = 12
+_REACH = 2.2
+"""How far apart neighbouring surfels may lie, in their edges."""
+_ALIKE = np.cos(np.radians(9.0))
+_OFF = 1.6
+"""How far off its plane a surfel may lie, in standard deviations of the points."""
+_POINT_OFF = 2.5
+"""The same for a tangent plane."""
+_TURNED = 0.5
+"""Cosine between a tangent plane's normal and that of the plane that it is moved onto, at least."""
+_LEAST_AREA_M2 = 0.01
+_LEAST_SURFELS = 6
+_BENT = 0.45
+"""What a paraboloid may explain of a patch, root mean square, in standard deviations."""
+_NARROW = 0.5
+"""Standard deviation across of a strip's surfels, in their edges, at most."""
+_ROUNDS = 4
+_AROUND = 4
+
+Ints = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class _Surfels:
+    """Means of neighbouring tangent planes.
+
+    Attributes:
+        points: (m, 3) metres.
+        normals: (m, 3) unit.
+        edge_m: Of the voxels.
+    """
+
+    points: Float64
+    normals: Float64
+    edge_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Flats:
+    """Planes of a room.
+
+    Attributes:
+        normals: (p, 3) unit, toward the free space.
+        offsets_m: (p,) along them.
+        narrow: (p,) mask of those no wider than a surfel: a board's edge, or a rail taken for one.
+        surfel: (m,) number of the plane that each surfel lies on, -1 where on none.
+    """
+
+    normals: Float64
+    offsets_m: Float64
+    narrow: Mask
+    surfel: Ints
+
+
+def flattened(planes: TangentPlanes, spacing_m: float) -> tuple[TangentPlanes, Mask]:
+    """Move the tangent planes that lie on a common plane onto it.
+
+    Args:
+        planes: n tangent planes.
+        spacing_m: Distance between neighbouring points in the middle of the room.
+
+    Returns:
+        The tangent planes, and the mask of those on a flat that is no mere strip.
+    """
+    surfels = _surfels(planes, _SURFEL * spacing_m)
+    flats = _grown(surfels, planes.noise_m)
+    return _moved(planes, surfels, flats)
+
+
+def _surfels(planes: TangentPlanes, edge_m: float) -> _Surfels:
+    """Mean tangent plane of each voxel and main direction of its normals."""
+    cell = np.floor((planes.points - planes.points.min(axis=0)) / edge_m).astype(np.int64)
+    axis = np.abs(planes.normals).argmax(axis=1)
+    side = 2 * axis + (np.take_along_axis(planes.normals, axis[:, None], 1)[:, 0] > 0)
+    shape = (*(cell.max(axis=0) + 1), 6)
+    key = np.ravel_multi_index((*cell.T, side), shape)
+    _, group, count = np.unique(key, return_inverse=True, return_counts=True)
+    point, normal = (
+        np.stack([np.bincount(group, values[:, k]) for k in range(3)], axis=1) / count[:, None]
+        for values in (planes.points, planes.normals)
+    )
+    length = np.linalg.norm(normal, axis=1)
+    sound = (length > _COHERENT) & (count > 1)
+    return _Surfels(point[sound], normal[sound] / length[sound, None], edge_m)
+
+
+def _grown(surfels: _Surfels, noise_m: float) -> Flats:
+    """Grow planes, in each part of the surface that runs on without a crease for itself."""
+    first, second, calm = _neighbours(surfels, _OFF * noise_m)
+    count = len(surfels.points)
+    part = components(np.stack([first, second], axis=1), count)
+    order = np.argsort(part, kind="stable")
+    starts = np.searchsorted(part[order], np.arange(part.max() + 2))
+    of_pair = np.argsort(part[first], kind="stable")
+    pair_starts = np.searchsorted(part[first][of_pair], np.arange(part.max() + 2))
+    number = np.empty(count, np.int64)
+    label = np.full(count, -1)
+    normals: list[Float64] = []
+    offsets: list[float] = []
+    narrow: list[bool] = []
+    for k in range(len(starts) - 1):
+        own = order[starts[k] : starts[k + 1]]
+        if not _large(len(own), surfels.edge_m):
+            continue
+        number[own] = np.arange(len(own))
+        pairs = of_pair[pair_starts[k] : pair_starts[k + 1]]
+        region = _Region(
+            surfels.points[own], surfels.normals[own], number[first[pairs]], number[second[pairs]]
+        )
+        for members, normal, offset in region.planes(calm[own], surfels.edge_m, noise_m):
+            label[own[members]] = len(normals)
+            normals.append(normal)
+            offsets.append(offset)
+            apart = region.points[members] - region.points[members].mean(axis=0)
+            width_m = np.linalg.svd(apart, compute_uv=False)
+            narrow.append(bool(width_m[1] < _NARROW * surfels.edge_m * np.sqrt(len(members))))
+    return Flats(
+        np.reshape(normals, (-1, 3)), np.asarray(offsets, float), np.asarray(narrow, bool), label
+    )
+
+
+def _neighbours(surfels: _Surfels, off_m: float) -> tuple[Ints, Ints, Float64]:
+    """Pairs of surfels that may be of one plane, sorted, and how much those of each differ."""
+    points, normals = surfels.points, surfels.normals
+    distance, near = cKDTree(points).query(
+        points,
+        k=range(2, _NEIGHBOURS + 2),
+        distance_upper_bound=_REACH * surfels.edge_m,
+        workers=-1,
+    )
+    first = np.repeat(np.arange(len(points)), _NEIGHBOURS)
+    second, there = near.ravel(), np.isfinite(distance).ravel()
+    first, second = first[there], second[there]
+    turn = np.einsum("ij,ij->i", normals[first], normals[second])
+    between = points[second] - points[first]
+    off = np.abs(np.einsum("ij,ij->i", between, normals[first] + normals[second])) / 2
+    alike = (turn > _ALIKE) & (off < 2 * off_m)
+    first, second, turn = first[alike], second[alike], turn[alike]
+    number = np.bincount(first, minlength=len(points))
+    differ = np.bincount(first, 1 - turn, minlength=len(points))
+    calm = np.where(number > _NEIGHBOURS // 4, differ / np.maximum(number, 1), np.inf)
+    return first, second, calm
+
+
+def _large(count: int, edge_m: float) -> bool:
+    return count >= _LEAST_SURFELS and count * edge_m**2 >= _LEAST_AREA_M2
+
+
+@dataclass(frozen=True, slots=True)
+class _Region:
+    """Surfels that hang together, and which pairs of them do.
+
+    Attributes:
+        points: (m, 3) metres.
+        normals: (m, 3) unit.
+        first: (e,) sorted, one of each pair, either way round.
+        second: (e,) the other.
+    """
+
+    points: Float64
+    normals: Float64
+    first: Ints
+    second: Ints
+
+    def planes(
+        self, calm: Float64, edge_m: float, noise_m: float
+    ) -> Iterator[tuple[Ints, Float64, float]]:
+        """The surfels, normal and offset of each plane, from the calmest surfel on."""
+        free = np.ones(len(calm), bool)
+        untried = np.isfinite(calm)
+        starts = np.searchsorted(self.first, np.arange(len(calm) + 1))
+        for seed in np.argsort(calm, kind="stable"):
+            if not (untried[seed] and free[seed]):
+                continue
+            near = self.second[starts[seed] : starts[seed + 1]]
+            members = np.append(near[free[near]], seed)
+            for _ in range(_ROUNDS):
+                members = self._on(*self._fitted(members), seed, free, _OFF * noise_m)
+                if len(members) < _LEAST_SURFELS:
+                    break
+            untried[members] = untried[seed] = False
+            if not _large(len(members), edge_m):
+                continue
+            normal, offset = self._fitted(members)
+            if _bends(self.points[members], normal, offset, _BENT * noise_m):
+                continue
+            free[members] = False
+            yield members, normal, offset
+
+    def _fitted(self, members: Ints) -> tuple[Float64, float]:
+        """Unit normal and offset of the plane of some surfels, by least squares."""
+        middle = self.points[members].mean(axis=0)
+        mean = self.normals[members].mean(axis=0)
+        normal = mean / np.linalg.norm(mean)
+        if len(members) >= _LEAST_SURFELS:
+            apart = self.points[members] - middle
+            least = np.linalg.eigh(apart.T @ apart)[1][:, 0]
+            normal = least if least @ mean > 0 else -least
+        return normal, float(middle @ normal)
+
+    def _on(self, normal: Float64, offset: float, seed: int, free: Mask, off_m: float) -> Ints:
+        """The free surfels on a plane that hang together with the seed."""
+        on = free & (np.abs(self.points @ normal - offset) < off_m)
+        on &= self.normals @ normal > _ALIKE
+        if not on[seed]:
+            return np.asarray([seed])
+        both = on[self.first] & on[self.second]
+        size = len(on)
+        ends = self.first[both], self.second[both]
+        graph = csr_array((np.ones(len(ends[0]), np.int8), ends), (size, size))
+        return np.asarray(breadth_first_order(graph, seed, return_predecessors=False), np.int64)
+
+
+def _bends(points: Float64, normal: Float64, offset: float, most_m: float) -> bool:
+    """Whether a paraboloid explains of the heights over a plane more than the noise."""
+    height = points @ normal - offset
+    across = np.linalg.svd(normal[None])[2][1:]
+    u, v = ((points - points.mean(axis=0)) @ across.T).T
+    scale = max(float(np.abs([u, v]).max()), 1e-9)
+    u, v = u / scale, v / scale
+    terms = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=1)
+    found = terms @ np.linalg.lstsq(terms, height, rcond=None)[0]
+    return bool(np.sqrt(np.square(found).mean()) > most_m)
+
+
+def _moved(planes: TangentPlanes, surfels: _Surfels, flats: Flats) -> tuple[TangentPlanes, Mask]:
+    """The tangent planes, those near a flat on it, and which these are."""
+    lain = np.flatnonzero(flats.surfel >= 0)
+    if not len(lain):
+        return planes, np.zeros(len(planes.points), bool)
+    _, near = cKDTree(surfels.points[lain]).query(
+        planes.points,
+        k=range(1, _AROUND + 1),
+        distance_upper_bound=1.5 * surfels.edge_m,
+        workers=-1,
+    )
+    label = np.append(flats.surfel[lain], -1)[near]
+    best = np.full(len(planes.points), np.inf, np.float32)
+    chosen = np.full(len(planes.points), -1)
+    height_at = np.zeros(len(planes.points), np.float32)
+    limit = np.float32(_POINT_OFF * planes.noise_m)
+    for rank in range(_AROUND):
+        plane = label[:, rank]
+        asked = np.flatnonzero(plane >= 0)
+        normal = flats.normals[plane[asked]].astype(np.float32)
+        height = np.einsum("ij,ij->i", planes.points[asked], normal)
+        height -= flats.offsets_m[plane[asked]].astype(np.float32)
+        turned = np.einsum("ij,ij->i", planes.normals[asked], normal)
+        cost = np.abs(height) / limit + 2 * (1 - turned)
+        better = (np.abs(height) < limit) & (turned > _TURNED) & (cost < best[asked])
+        at = asked[better]
+        best[at], chosen[at], height_at[at] = cost[better], plane[at], height[better]
+    on = np.flatnonzero(chosen >= 0)
+    points, normals, support = planes.points.copy(), planes.normals.copy(), planes.support.copy()
+    normals[on] = flats.normals[chosen[on]]
+    points[on] -= height_at[on, None] * normals[on]
+    support[on] = 1
+    moved = TangentPlanes(points, normals, planes.spacing_m, support, planes.noise_m)
+    return moved, (chosen >= 0) & ~np.append(flats.narrow, True)[chosen]
