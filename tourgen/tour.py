@@ -24,6 +24,7 @@ from pydantic import (
     Field,
     ValidationError,
     ValidationInfo,
+    field_validator,
     model_validator,
 )
 
@@ -40,6 +41,7 @@ from tourgen.tour_values import (
     OnlyWith,
     Pose,
     Position,
+    Radii,
     RoomId,
     RoomRef,
     Stations,
@@ -73,7 +75,10 @@ class Box(_Table):
     def _has_inside(self) -> Box:
         for axis, low, high in zip("xyz", self.min, self.max, strict=True):
             if low >= high:
-                raise fault(f"expected min below max along {axis}, found {low:g} and {high:g}")
+                raise fault(
+                    f"expected min below max along {axis}, found {low:g} and {high:g}",
+                    "swap them",
+                )
         return self
 
 
@@ -167,7 +172,8 @@ class Surface(_Table):
         default=5,
         ge=1,
         le=8,
-        description="`poisson`: down to this depth the octree is complete, points or none.",
+        description="`poisson`: down to this depth the octree is complete, points or none; at most "
+        "`depth`.",
     )
     samples_per_node: Annotated[Number, _POISSON] = Field(
         default=1.0,
@@ -187,7 +193,7 @@ class Surface(_Table):
         strict=True,
         description="`poisson`: places vertices by linear instead of quadratic interpolation.",
     )
-    radii_mm: Annotated[tuple[Number, ...] | None, _BALLS, Form("list of numbers")] = Field(
+    radii_mm: Annotated[Radii | None, _BALLS] = Field(
         default=None,
         min_length=1,
         max_length=8,
@@ -227,6 +233,14 @@ class Surface(_Table):
         description="`crust`: how far a face may lie from square to the line to the pole at its "
         "widest corner.",
     )
+
+    @field_validator("full_depth")
+    @classmethod
+    def _within_depth(cls, value: int, info: ValidationInfo) -> int:
+        depth = info.data.get("depth")  # none where it is itself at fault
+        if depth is not None and value > depth:
+            raise fault(f"expected at most `depth`, {depth}, found {value}")
+        return value
 
 
 class Texture(_Table):
