@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from tourgen.fitting.lengths import Corner, corners, detail_m
+from tourgen.fitting.plausible import require_room
 from tourgen.geometry import Float64, OrientedCloud, Panorama, PointCloud
-from tourgen.scans import ReadFacts, read_panoramas, read_room
+from tourgen.scans import ReadFacts, read_panoramas, read_room, without_repeats
 from tourgen.stages import exposure, floor, normals, ownership, register, sift, stations, thin
 from tourgen.stages.spacing import Spacing
 from tourgen.tour import Room, open_scans
@@ -84,9 +85,17 @@ def reading(room: Room) -> Reading:
 
 
 def read(room: Room, folder: Path, _: Reading) -> RoomScan:
-    """Read a room's scans; the settings are those of the room, gathered for the key."""
+    """Read a room's scans; the settings are those of the room, gathered for the key.
+
+    Raises:
+        InputError: A scan cannot be read, or what they hold cannot be a room.
+    """
     scans = open_scans(room, folder)
     cloud, found, facts = read_room(scans, room.keep, room.remove, room.clean.min_points)
+    count = len(cloud)
+    cloud = without_repeats(cloud)
+    told = require_room(cloud.points, room, facts)
+    facts = replace(facts, warnings=(*facts.warnings, *told), dropped_repeated=count - len(cloud))
     panoramas = read_panoramas(scans, cloud.origin)
     if room.stations == "auto":
         return RoomScan(cloud, found, panoramas, facts)
