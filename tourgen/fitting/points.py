@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from tourgen.errors import InputError
 from tourgen.fitting.lengths import Corner, corners, detail_m
 from tourgen.fitting.plausible import require_room
 from tourgen.geometry import Float64, OrientedCloud, Panorama, PointCloud
@@ -18,6 +19,10 @@ from tourgen.scans import ReadFacts, read_panoramas, read_room, without_repeats
 from tourgen.stages import exposure, floor, normals, ownership, register, sift, stations, thin
 from tourgen.stages.spacing import Spacing
 from tourgen.tour import Room, open_scans
+
+_SPACING_MM = (0.1, 1000.0)
+_LEAST_POINTS = 100
+"""Fewer tell no surface."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,10 +162,35 @@ def thinned(cloud: PointCloud, spacing: Spacing, asked: Thinning) -> PointCloud:
 
     A scan denser than the detail is thinned further, toward a point a cell: each is the mean of
     so many that more would only cost.
+
+    Raises:
+        InputError: No room can be made of so few points, or with such a detail.
     """
+    spacing_mm = 1000 * spacing.median_m
+    if not _SPACING_MM[0] <= spacing_mm <= _SPACING_MM[1]:
+        raise InputError(
+            f"scan: expected points {_SPACING_MM[0]:g} to {_SPACING_MM[1]:g} mm apart in the "
+            f"middle, found {spacing_mm:.2g} mm",
+            "check the export and `unit`",
+        )
+    most_mm = 100 * float(np.ptp(cloud.points, axis=0).max())
+    if asked.detail_mm and asked.detail_mm > most_mm:
+        raise InputError(
+            f"surface.detail_mm: expected 1 to {most_mm:.3g}, a tenth of the room, "
+            f"found {asked.detail_mm:g}",
+            "leave it out: it follows from the scan",
+        )
     detail = detail_m(spacing, asked.detail_mm)
     voxel_m = max(detail / 2, detail - spacing.median_m / 2)
-    return thin.thin(cloud, thin.Settings(asked.thin_mm / 1000 if asked.thin_mm else voxel_m))
+    voxel_m = asked.thin_mm / 1000 if asked.thin_mm else voxel_m
+    left = thin.thin(cloud, thin.Settings(voxel_m))
+    if len(left) < _LEAST_POINTS:
+        raise InputError(
+            f"surface: expected {_LEAST_POINTS} points or more, found {len(left)} once they were "
+            f"thinned to {1000 * voxel_m:.3g} mm",
+            "lower `surface.detail_mm` or `clean.thin_mm`",
+        )
+    return left
 
 
 def oriented(
