@@ -80,7 +80,10 @@ _INTRODUCTION: Final = f"""\
 Coordinates are those of the room's scans after `unit` and `up` were applied: metres, right-handed,
 z up; `[x, y, z]`. A *text* is a string for every language, or a table of strings by language:
 `{{ en = "Stairs", fr = "Escalier" }}`; a language that is left out shows the first one that is
-there. An unknown key is an error. `tourgen check` tells all faults at once.
+there. An unknown key is an error. `tourgen check` tells all faults at once that this file and the
+scans' headers show. What only the points can tell stops a build while it reads them, and leaves
+the site as it was: a scan on one plane, on a line or in one spot is no room. Points at the place of
+another are dropped; colours that are all black count as none, and the points are grey.
 """
 
 

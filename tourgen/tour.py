@@ -151,8 +151,8 @@ class Surface(_Table):
         default=None,
         ge=1,
         le=500,
-        description="The finest detail that the surface shall show. Left out: the spacing of the "
-        "scan's points in the middle, at least 6.",
+        description="The finest detail that the surface shall show; at most a tenth of the room. "
+        "Left out: the spacing of the scan's points in the middle, at least 6.",
     )
     offset_mm: Number = Field(
         default=0.0,
@@ -286,7 +286,9 @@ class Room(_Table):
     id: RoomId = Field(description="Name of the room's folder and address: a-z, 0-9, - and _.")
     title: Text = Field(default={}, description="The room's name. Left out: its `id`.")
     scans: tuple[Annotated[ScanRef, BeforeValidator(_as_reference)], ...] = Field(
-        min_length=1, description="The room's scans: file names or tables."
+        min_length=1,
+        description="The room's scans: file names or tables; none may lie more than a metre apart "
+        "from the others.",
     )
     stations: Stations = Field(
         default="auto",
@@ -294,7 +296,9 @@ class Room(_Table):
         "found from the points.",
     )
     unit: Literal["m", "cm", "mm", "ft"] = Field(
-        default="m", description="The unit of the scans' coordinates."
+        default="m",
+        description="The unit of the scans' coordinates; a room narrower than 5 cm or wider than "
+        "1 km in it is refused.",
     )
     up: Literal["z", "-z", "y", "-y", "x", "-x"] = Field(
         default="z", description="The axis of the scans that points up."

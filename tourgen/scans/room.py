@@ -225,7 +225,9 @@ def _within(points: Float64, box: Box) -> npt.NDArray[np.bool_]:
 def _corners(bounds: Float64) -> tuple[str, str]:
     """The lowest and the highest of several corners, as tour.toml writes them."""
     low, high = np.nanmin(bounds, axis=0), np.nanmax(bounds, axis=0)
-    first, second = (", ".join(f"{value:.2f}" for value in corner) for corner in (low, high))
+    first, second = (
+        ", ".join(f"{value:.2f}" for value in np.round(corner, 2) + 0.0) for corner in (low, high)
+    )
     return f"[{first}]", f"[{second}]"
 
 
