@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scan_files import cloud_table, write_ply
 
+from tourgen.errors import InputError
+from tourgen.fitting.plausible import require_room
 from tourgen.fitting.points import read, reading
 from tourgen.geometry import PointCloud
 from tourgen.scans import ReadFacts
@@ -47,6 +49,22 @@ def test_a_relief_2_cm_deep_on_a_wall_4_m_wide_is_no_plane(tmp_path):
     relief = POINTS * (1, 1, 0)
     relief[:, 2] = np.where(np.abs(relief[:, 0]) < 1, 0.02, 0)
     assert len(read_as(tmp_path, "m", relief)[0]) == 12_000
+
+
+def test_the_order_of_the_points_does_not_matter():
+    """A scanner writes column by column: one point in so many lies at one height."""
+    many = np.tile(POINTS[:1000], (400, 1)).astype(np.float32)
+    many[::4, 2] = 0
+    assert require_room(many, Room(id="a", scans=["a.ply"]), ReadFacts(400_000, 0, 0, ())) == ()
+
+
+def test_too_few_places_are_told_with_what_was_dropped(tmp_path):
+    with pytest.raises(InputError) as told:
+        read_as(tmp_path, "m", np.repeat(POINTS[:2000], 6, axis=0))
+    assert told.value.message == (
+        "scan `a.ply`: expected at least 10000 points, found 2000, "
+        "10000 at the place of another dropped"
+    )
 
 
 def test_a_scan_given_twice_is_read_once(tmp_path):

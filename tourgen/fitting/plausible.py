@@ -33,30 +33,44 @@ def require_room(points: Float32, room: Room, facts: ReadFacts) -> tuple[str, ..
 
     Raises:
         InputError: The scans lie apart; they are too narrow or too wide for a room; they lie on
-            a line or on a plane.
+            a line or on a plane, or most of them repeat others.
     """
     _require_together(room, facts.bounds)
     subject = "scan " + " + ".join(f"`{scan.file}`" for scan in room.scans)
-    sample = points[:: max(1, len(points) // _SAMPLE)].astype(np.float64)
+    check = "check the export" + (", `keep` and `remove`" if facts.dropped_cropped else "")
+    sample = _sample(points)
     low, high = np.quantile(sample, [_STRAYS, 1 - _STRAYS], axis=0)
     width_m = float((high - low).max())
     other = _other_unit(width_m, room)
-    check = "check the export" + (", `keep` and `remove`" if facts.dropped_cropped else "")
-    if width_m < _NARROWEST_M:
-        found = f"it {1000 * width_m:.3g} mm wide" if width_m else "all points in one spot"
-        raise InputError(
-            f"{subject}: expected a room, found {found}",
-            other or check,
-        )
-    if width_m > _WIDEST_M:
-        raise InputError(
-            f"{subject}: expected a room of at most {_WIDEST_M:g} m, found it {width_m:.0f} m wide",
-            "; else ".join(filter(None, (other, "keep a part of it, by `keep`"))),
-        )
+    _require_width(width_m, subject, other, check)
     _require_depth(sample, subject, check)
+    if len(points) < room.clean.min_points:
+        raise InputError(
+            f"{subject}: expected at least {room.clean.min_points} points, found {len(points)}, "
+            f"{facts.dropped_repeated} at the place of another dropped",
+            "check the export, or lower `clean.min_points`",
+        )
     if width_m > _WIDE_M and other:
         return (f"{subject}: is {width_m:.0f} m wide; {other}",)
     return ()
+
+
+def _sample(points: Float32) -> Float64:
+    """Some of the points; at random, since scanners write them column by column."""
+    if len(points) > _SAMPLE:
+        points = points[np.random.default_rng(0).integers(0, len(points), _SAMPLE)]
+    return points.astype(np.float64)
+
+
+def _require_width(width_m: float, subject: str, other_unit: str, check: str) -> None:
+    if width_m < _NARROWEST_M:
+        found = f"it {1000 * width_m:.3g} mm wide" if width_m else "all points in one spot"
+        raise InputError(f"{subject}: expected a room, found {found}", other_unit or check)
+    if width_m > _WIDEST_M:
+        raise InputError(
+            f"{subject}: expected a room of at most {_WIDEST_M:g} m, found it {width_m:.0f} m wide",
+            "; else ".join(filter(None, (other_unit, "keep a part of it, by `keep`"))),
+        )
 
 
 def _other_unit(width_m: float, room: Room) -> str:

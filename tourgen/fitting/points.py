@@ -99,8 +99,9 @@ def read(room: Room, folder: Path, _: Reading) -> RoomScan:
     cloud, found, facts = read_room(scans, room.keep, room.remove, room.clean.min_points)
     count = len(cloud)
     cloud = without_repeats(cloud)
+    facts = replace(facts, dropped_repeated=count - len(cloud))
     told = require_room(cloud.points, room, facts)
-    facts = replace(facts, warnings=(*facts.warnings, *told), dropped_repeated=count - len(cloud))
+    facts = replace(facts, warnings=(*facts.warnings, *told))
     panoramas = read_panoramas(scans, cloud.origin)
     if room.stations == "auto":
         return RoomScan(cloud, found, panoramas, facts)

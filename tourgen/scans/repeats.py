@@ -17,7 +17,7 @@ _ODD = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)
 
 
 def without_repeats(cloud: PointCloud) -> PointCloud:
-    """The first point at each place, in their order.
+    """The first point at each place, in their order; 24 bytes a point at work.
 
     Args:
         cloud: n points.
