@@ -89,7 +89,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         partial(points.read, room, folder),
         settings=points.reading(room),
         digests=tuple(digests[folder / each.file] for each in room.scans),
-        version=2,
+        version=3,
         libraries=("pye57",),
     )
     stood = task(

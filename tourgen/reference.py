@@ -31,7 +31,7 @@ from tourgen.tour import (
     TourHead,
     Viewpoint,
 )
-from tourgen.tour_faults import keys, tables
+from tourgen.tour_faults import keys, limits, marks, tables
 from tourgen.tour_values import Form, OnlyWith, as_room_id
 
 _TABLES: Final[tuple[tuple[str, type[BaseModel], str], ...]] = (
@@ -80,7 +80,10 @@ _INTRODUCTION: Final = f"""\
 Coordinates are those of the room's scans after `unit` and `up` were applied: metres, right-handed,
 z up; `[x, y, z]`. A *text* is a string for every language, or a table of strings by language:
 `{{ en = "Stairs", fr = "Escalier" }}`; a language that is left out shows the first one that is
-there. An unknown key is an error. `tourgen check` tells all faults at once.
+there. An unknown key is an error. `tourgen check` tells all faults at once that this file and the
+scans' headers show. What only the points can tell stops a build while it reads them, and leaves
+the site as it was: a scan on one plane, on a line or in one spot is no room. Points at the place of
+another are dropped; colours that are all black count as none, and the points are grey.
 """
 
 
@@ -107,21 +110,11 @@ def _row(key: str, info: FieldInfo) -> str:
 
 def _type(info: FieldInfo) -> str:
     """What a key takes, in words."""
-    found = [*info.metadata, *_metadata(info.annotation)]
-    form = next((each.words for each in found if isinstance(each, Form)), None)
-    limits = [
-        f"{sign} {getattr(each, name):g}"
-        for each in found
-        for name, sign in (("ge", "≥"), ("le", "≤"))
-        if hasattr(each, name)
-    ]
-    return ", ".join([form or _words(info.annotation), *limits])
-
-
-def _metadata(annotation: object) -> Iterator[object]:
-    """What is said of the parts of an optional type."""
-    for part in get_args(annotation):
-        yield from getattr(part, "__metadata__", ())
+    # of a list, its own form comes after those of its items
+    form = next((each.words for each in reversed(marks(info)) if isinstance(each, Form)), None)
+    limit = limits(info)
+    ends = [f"{sign} {limit[name]:g}" for name, sign in (("ge", "≥"), ("le", "≤")) if name in limit]
+    return ", ".join([form or _words(info.annotation), *ends])
 
 
 def _words(annotation: object) -> str:

@@ -38,6 +38,7 @@ def _room_report(room: RoomResult) -> Mapping[str, Any]:
         "points_read": summary.facts.points_read,
         "points_invalid": summary.facts.dropped_invalid,
         "points_cropped": summary.facts.dropped_cropped,
+        "points_repeated": summary.facts.dropped_repeated,
         "points_removed": dict(summary.removed),
         "points_used": summary.points_used,
         "stations": summary.stations.round(3).tolist(),

@@ -24,6 +24,7 @@ from pydantic import (
     Field,
     ValidationError,
     ValidationInfo,
+    field_validator,
     model_validator,
 )
 
@@ -40,6 +41,7 @@ from tourgen.tour_values import (
     OnlyWith,
     Pose,
     Position,
+    Radii,
     RoomId,
     RoomRef,
     Stations,
@@ -73,7 +75,10 @@ class Box(_Table):
     def _has_inside(self) -> Box:
         for axis, low, high in zip("xyz", self.min, self.max, strict=True):
             if low >= high:
-                raise fault(f"expected min below max along {axis}, found {low:g} and {high:g}")
+                raise fault(
+                    f"expected min below max along {axis}, found {low:g} and {high:g}",
+                    "swap them",
+                )
         return self
 
 
@@ -146,8 +151,8 @@ class Surface(_Table):
         default=None,
         ge=1,
         le=500,
-        description="The finest detail that the surface shall show. Left out: the spacing of the "
-        "scan's points in the middle, at least 6.",
+        description="The finest detail that the surface shall show; at most a tenth of the room. "
+        "Left out: the spacing of the scan's points in the middle, at least 6.",
     )
     offset_mm: Number = Field(
         default=0.0,
@@ -167,7 +172,8 @@ class Surface(_Table):
         default=5,
         ge=1,
         le=8,
-        description="`poisson`: down to this depth the octree is complete, points or none.",
+        description="`poisson`: down to this depth the octree is complete, points or none; at most "
+        "`depth`.",
     )
     samples_per_node: Annotated[Number, _POISSON] = Field(
         default=1.0,
@@ -187,7 +193,7 @@ class Surface(_Table):
         strict=True,
         description="`poisson`: places vertices by linear instead of quadratic interpolation.",
     )
-    radii_mm: Annotated[tuple[Number, ...] | None, _BALLS, Form("list of numbers")] = Field(
+    radii_mm: Annotated[Radii | None, _BALLS] = Field(
         default=None,
         min_length=1,
         max_length=8,
@@ -227,6 +233,14 @@ class Surface(_Table):
         description="`crust`: how far a face may lie from square to the line to the pole at its "
         "widest corner.",
     )
+
+    @field_validator("full_depth")
+    @classmethod
+    def _within_depth(cls, value: int, info: ValidationInfo) -> int:
+        depth = info.data.get("depth")  # none where it is itself at fault
+        if depth is not None and value > depth:
+            raise fault(f"expected at most `depth`, {depth}, found {value}")
+        return value
 
 
 class Texture(_Table):
@@ -272,7 +286,9 @@ class Room(_Table):
     id: RoomId = Field(description="Name of the room's folder and address: a-z, 0-9, - and _.")
     title: Text = Field(default={}, description="The room's name. Left out: its `id`.")
     scans: tuple[Annotated[ScanRef, BeforeValidator(_as_reference)], ...] = Field(
-        min_length=1, description="The room's scans: file names or tables."
+        min_length=1,
+        description="The room's scans: file names or tables; none may lie more than a metre apart "
+        "from the others.",
     )
     stations: Stations = Field(
         default="auto",
@@ -280,7 +296,9 @@ class Room(_Table):
         "found from the points.",
     )
     unit: Literal["m", "cm", "mm", "ft"] = Field(
-        default="m", description="The unit of the scans' coordinates."
+        default="m",
+        description="The unit of the scans' coordinates; a room narrower than 5 cm or wider than "
+        "1 km in it is refused.",
     )
     up: Literal["z", "-z", "y", "-y", "x", "-x"] = Field(
         default="z", description="The axis of the scans that points up."

@@ -5,10 +5,11 @@ from __future__ import annotations
 import difflib
 import re
 import types
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final, get_args
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from tourgen.errors import InputError
@@ -20,6 +21,15 @@ _EXPLAINED: Final[Mapping[str, str]] = {
     "solver_divide": "it belonged to the older, unscreened Poisson solver: the depth from which "
     "on that one solved in blocks, to save memory; the screened solver needs none; set `depth`",
 }
+
+_SPELLED_OUT: Final[Mapping[str, str]] = {
+    **dict.fromkeys(("metre", "meter", "metres", "meters"), "m"),
+    **dict.fromkeys(("centimetre", "centimeter", "centimetres", "centimeters"), "cm"),
+    **dict.fromkeys(("millimetre", "millimeter", "millimetres", "millimeters"), "mm"),
+    **dict.fromkeys(("foot", "feet"), "ft"),
+    **{f"{axis}{between}up": axis for axis in "zyx" for between in ("", " ", "-", "_")},
+}
+"""Words that mean one of those expected, and look like none of them."""
 
 Location = tuple[int | str, ...]
 
@@ -59,7 +69,7 @@ def _place(location: Location, data: Any) -> tuple[int, ...]:
 
 def _told(detail: ErrorDetails, data: Mapping[str, Any], model: type[BaseModel]) -> InputError:
     unknown = detail["type"] == "extra_forbidden"
-    message, hint = _unknown_key(detail["loc"], model) if unknown else _words(detail)
+    message, hint = _unknown_key(detail["loc"], model) if unknown else _words(detail, model)
     return InputError(
         _CONTROL.sub("?", f"{_subject(detail['loc'], data)}: {message}"), _CONTROL.sub("?", hint)
     )
@@ -83,7 +93,7 @@ def _subject(location: Location, data: Mapping[str, Any]) -> str:
     return ": ".join([*parts, joined] if joined else parts)
 
 
-def _words(detail: ErrorDetails) -> tuple[str, str]:
+def _words(detail: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
     """What was expected and found, and the hint."""
     kind, context, found = detail["type"], detail.get("ctx", {}), shown(detail["input"])
     if kind == "tour":
@@ -92,23 +102,74 @@ def _words(detail: ErrorDetails) -> tuple[str, str]:
         return "expected this key, found none", ""
     if kind == "literal_error":
         words = tuple(re.findall(r"'([^']*)'", context["expected"]))
-        return f"{listed(words)}, found {found}", near(str(detail["input"]), words)
+        return f"{listed(words)}, found {found}", _meant(str(detail["input"]), words)
     if kind == "tuple_type" and isinstance(detail["input"], dict):
         return "expected a list, found a table", f"write `[[{detail['loc'][-1]}]]` above it"
     expected = {
+        "bool_type": "true or false",
         "float_type": "a number",
         "int_type": "a whole number",
         "finite_number": "a finite number",
         "string_type": "a string",
         "tuple_type": "a list",
         "model_type": "a table",
-        "too_short": "at least one",
-        "greater_than_equal": f"at least {context.get('ge')}",
-        "less_than_equal": f"at most {context.get('le')}",
-    }.get(kind)
+    }.get(kind) or _range(detail, model)
     if expected is None:
         return f"{detail['msg'][:1].lower()}{detail['msg'][1:]}, found {found}", ""
     return f"expected {expected}, found {found}", ""
+
+
+def _meant(word: str, words: tuple[str, ...]) -> str:
+    """The hint that names the one of a few short words that was meant, or ""."""
+    plain = word.strip().casefold().lstrip("+")
+    meant = _SPELLED_OUT.get(plain, plain)
+    if min(map(len, words)) > 2:  # of units and axes every letter counts
+        return near(meant, words)
+    return f"did you mean `{meant}`?" if meant in words else ""
+
+
+def _range(detail: ErrorDetails, model: type[BaseModel]) -> str | None:
+    """What a value that is too small, too large, too short or too long was expected to be."""
+    number = detail["type"] in ("greater_than_equal", "less_than_equal")
+    if not number and detail["type"] not in ("too_short", "too_long"):
+        return None
+    limit = limits(_field(detail["loc"], model))
+    if number:
+        least, most = limit["ge"], limit.get("le")
+        return f"at least {least:g}" if most is None else f"{least:g} to {most:g}"
+    most = limit.get("max_length")
+    return "at least one" if most is None else f"{limit['min_length']:g} to {most:g} of them"
+
+
+def _field(location: Location, model: type[BaseModel]) -> FieldInfo:
+    """What pydantic knows about the key at fault, or about the list that the value stands in."""
+    *above, name = (key for key in location if isinstance(key, str))
+    for key in above:
+        model = tables(model)[key]
+    return keys(model)[name]
+
+
+def limits(info: FieldInfo) -> Mapping[str, float]:
+    """Least and most that a key takes: `ge`, `le`, and of a list `min_length`, `max_length`."""
+    names = ("ge", "le", "min_length", "max_length")
+    return {
+        name: getattr(each, name)
+        for each in marks(info)
+        for name in names
+        if getattr(each, name, None) is not None
+    }
+
+
+def marks(info: FieldInfo) -> tuple[object, ...]:
+    """All that is said of a key's type, that of the parts of the type first."""
+    return (*_marks(info.annotation), *info.metadata)
+
+
+def _marks(annotation: object) -> Iterator[object]:
+    for part in get_args(annotation):
+        yield from _marks(part)
+    for mark in getattr(annotation, "__metadata__", ()):
+        yield from mark.metadata if isinstance(mark, FieldInfo) else (mark,)
 
 
 def _unknown_key(location: Location, model: type[BaseModel]) -> tuple[str, str]:
@@ -128,7 +189,7 @@ def _unknown_key(location: Location, model: type[BaseModel]) -> tuple[str, str]:
     return f"unknown key, {listed(known)}", hint
 
 
-def keys(model: type[BaseModel]) -> dict[str, Any]:
+def keys(model: type[BaseModel]) -> dict[str, FieldInfo]:
     """The keys that a table may have, with what pydantic knows about each."""
     return {info.alias or name: info for name, info in model.model_fields.items()}
 

@@ -7,6 +7,7 @@ A value at fault raises a `PydanticCustomError` of type "tour" with message and 
 from __future__ import annotations
 
 import difflib
+import itertools
 import os
 import re
 import unicodedata
@@ -129,6 +130,16 @@ def _check_text(value: object, info: ValidationInfo) -> dict[str, str]:
     return {language: texts.get(language, first) for language in declared or texts}
 
 
+def _check_radii(radii: tuple[float, ...]) -> tuple[float, ...]:
+    if any(after <= before for before, after in itertools.pairwise(radii)):
+        found = ", ".join(f"{radius:g}" for radius in radii)
+        raise fault(
+            f"expected each larger than the one before, found [{found}]",
+            "sort them from small to large",
+        )
+    return radii
+
+
 def _check_file(name: str, info: ValidationInfo) -> str:
     if info.context is None:
         return name
@@ -232,6 +243,11 @@ class Form:
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False), Form("number")]
 Whole = Annotated[int, Field(strict=True), Form("whole number")]
+Radii = Annotated[
+    tuple[Annotated[Number, Field(ge=0.1, le=1000)], ...],
+    AfterValidator(_check_radii),
+    Form("list of numbers"),
+]
 Position = Annotated[
     tuple[float, float, float], BeforeValidator(_check_position), Form("`[x, y, z]`")
 ]

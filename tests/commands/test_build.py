@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from box_tour import box_scan
+from PIL import Image
+from scan_files import cloud_table, write_ply
 
 from tourgen.cli import main
+from tourgen.stages.surface import crust
 
 
 def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
@@ -72,6 +78,68 @@ def test_a_changed_scan_is_read_again(box_copy: Path, capsys: pytest.CaptureFixt
     plan = told(capsys, "plan", str(box_copy))
     assert "scan" in plan["left"]
     assert plan["right"] == {}
+
+
+def test_repeats_change_nothing_and_black_is_told(
+    box_copy: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A thousand points at the place of another one; and a program that knows no colours."""
+    before = json.loads((box_copy / "site/report.json").read_text("utf-8"))["rooms"]["left"]
+    points, _ = box_scan(0)
+    points = np.concatenate([points, np.repeat(points[5000:5001], 1000, axis=0)])
+    colors = np.zeros((len(points), 3), np.uint8)
+    write_ply(box_copy / "scans/left.ply", cloud_table(points, colors))
+    capsys.readouterr()
+    assert main(["build", str(box_copy)]) == 0
+    assert (
+        "warning: room `left`: scan `scans/left.ply`: has colours that are all black, "
+        "its points are grey"
+    ) in capsys.readouterr().out.splitlines()
+    after = json.loads((box_copy / "site/report.json").read_text("utf-8"))["rooms"]["left"]
+    assert after["points_repeated"] == before["points_repeated"] + 1000
+    same = ("stations", "points_used", "surface", "area_m2", "faces", "cloud_to_mesh_mm")
+    assert {key: after[key] for key in same} == {key: before[key] for key in same}
+    poster = Image.open(box_copy / "site/rooms/left/poster.webp")
+    assert np.abs(np.median(np.asarray(poster), axis=(0, 1)) - 160).max() < 5
+
+
+@pytest.mark.parametrize(
+    ("setting", "said", "hint"),
+    [
+        (
+            'method = "crust"',
+            "surface: crust: expected at most 1000 points, found ",
+            "take auto, poisson, signed-distance or ball-pivoting",
+        ),
+        (
+            'method = "ball-pivoting"\nradii_mm = [900]',
+            "surface.radii_mm: expected the first from ",
+            "mm apart in the middle",
+        ),
+        ("detail_mm = 400", "surface.detail_mm: expected 1 to 30", "leave it out"),
+    ],
+)
+def test_a_surface_that_cannot_be_drawn_leaves_the_site_whole(
+    box_copy: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    setting: str,
+    said: str,
+    hint: str,
+) -> None:
+    monkeypatch.setattr(crust, "Settings", partial(crust.Settings, most_points=1000))
+    before = published(box_copy)
+    tour = (box_copy / "tour.toml").read_text("utf-8")
+    detail = "" if "detail_mm" in setting else "detail_mm = 30\n"
+    tour = tour.replace("detail_mm = 30\n", f"{detail}{setting}\n", 1)
+    (box_copy / "tour.toml").write_text(tour, "utf-8")
+    capsys.readouterr()
+    assert main(["build", str(box_copy)]) == 2
+    output = capsys.readouterr().err
+    (line,) = (line for line in output.splitlines() if line.startswith("error: "))
+    assert line.startswith(f"error: room `left`: {said}")
+    assert hint in output.partition("hint: ")[2]
+    assert published(box_copy) == before
 
 
 def test_a_killed_build_goes_on(box_copy: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -144,7 +144,9 @@ def test_normals_that_lie_in_the_surface_carry_no_ball() -> None:
 
 @pytest.mark.parametrize("first_m", [0.00015, 0.06, 0.9])
 def test_a_first_ball_that_fits_no_spacing_names_the_range(first_m: float) -> None:
-    told = r"first of radii_m: expected 0\.002\d* to 0\.02\d*, found"
+    told = (
+        rf"surface.radii_mm: expected the first from 2\.\d+ to 2\d\.\d, found {1000 * first_m:g}$"
+    )
     with pytest.raises(InputError, match=told):
         ball_pivoting(flat(10_000), Settings((first_m,)))
 

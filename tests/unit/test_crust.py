@@ -174,7 +174,7 @@ def test_a_thousand_points_in_one_place_count_once() -> None:
 def test_more_points_than_it_can_do_are_refused_with_the_methods_that_can() -> None:
     with pytest.raises(InputError, match="crust: expected at most 1000 points, found 5760") as told:
         crust(RING, Settings(0.055, most_points=1000))
-    for method in ("poisson", "signed-distance", "ball-pivoting"):
+    for method in ("auto", "poisson", "signed-distance", "ball-pivoting", "`clean.thin_mm`"):
         assert method in told.value.hint
 
 

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from sampled import cloud, flat, sphere
 
-from tourgen.errors import InputError
+from tourgen.errors import InputError, StageError
 from tourgen.fitting import surface
 from tourgen.geometry import PointCloud
 from tourgen.stages.spacing import Spacing
@@ -42,6 +42,13 @@ def test_each_method_draws_the_sphere_and_is_named(keys: dict) -> None:
     assert np.quantile(away, 0.95) < 0.01
     assert len(found.mesh.faces) > 1000
     assert str(keys["method"]) in found.told or found.told.startswith("signed-distance on 1")
+
+
+def test_cells_wider_than_the_points_lie_apart_are_told_with_their_key() -> None:
+    asked = Surface(method="signed-distance", detail_mm=400)
+    with pytest.raises(StageError) as told:
+        surface.drawn(asked, sphere(12_000), SPACING, surface.drawing(asked))
+    assert "`surface.detail_mm`" in told.value.hint
 
 
 @pytest.mark.parametrize("method", ["auto", "poisson", "ball-pivoting"])

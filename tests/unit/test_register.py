@@ -126,7 +126,8 @@ def test_stations_without_overlap_are_told() -> None:
     away = (np.eye(3), np.array([9.0, 0, 0]))
     given, places = scanned(box_scan, STATIONS, [STILL, STILL, away])
     with pytest.raises(
-        InputError, match=r"stations \d and \d: expected an overlap of 10% or more, found 0%"
+        InputError,
+        match=r"stations \d at \[.*\] and 3 at .*: expected an overlap of 10% or more, found 0%",
     ):
         register.register(given, places, SETTINGS)
 

@@ -5,7 +5,7 @@ import pytest
 from scan_files import SHARED_SCANS, E57Part, cloud_table, write_e57, write_ply, xyz_fields
 
 from tourgen.errors import InputError
-from tourgen.scans import FORMATS, open_scan, read_room
+from tourgen.scans import FORMATS, open_scan, read_room, without_repeats
 from tourgen.tour import Box
 
 ODD_FILES = sorted(
@@ -80,6 +80,46 @@ def test_a_scan_without_color_is_grey_with_a_warning(tmp_path):
     assert facts.warnings == ("scan `a.ply`: has no colours, its points are grey",)
 
 
+@pytest.mark.parametrize("full", [np.uint8(255), np.float32(1), np.uint16(65535)])
+def test_a_black_scan_is_grey_with_a_warning_and_the_others_are_not(tmp_path, full):
+    """Many programs write colours of zero where there are none."""
+    points = np.arange(6.0).reshape(2, 3)
+    black = np.zeros((2, 3), full.dtype)
+    lit = black.copy()
+    lit[1, 2] = full
+    scans = [ply(tmp_path / "a.ply", points, black), ply(tmp_path / "b.ply", points + 1, lit)]
+    cloud, _, facts = read_room(scans)
+    assert cloud.colors.tolist() == [[160] * 3, [160] * 3, [0] * 3, [0, 0, 255]]
+    assert facts.warnings == ("scan `a.ply`: has colours that are all black, its points are grey",)
+
+
+def test_what_the_crop_darkens_stays_dark(tmp_path):
+    """A black cupboard alone is black: its scan has seen light."""
+    points, colors = np.arange(6.0).reshape(2, 3), np.uint8([[0, 0, 0], [9, 9, 9]])
+    keep = Box(min=(0, 0, 0), max=(2, 2, 2))
+    cloud, _, facts = read_room([ply(tmp_path / "a.ply", points, colors)], keep)
+    assert cloud.colors.tolist() == [[0, 0, 0]]
+    assert facts.warnings == ()
+
+
+def test_a_scan_that_the_crop_leaves_nothing_of_is_told(tmp_path):
+    points, colors = np.ones((2, 3)), np.ones((2, 3), np.uint8)
+    near, far = ply(tmp_path / "a.ply", points, colors), ply(tmp_path / "b.ply", 9 * points, colors)
+    _, _, facts = read_room([near, far], Box(min=(0, 0, 0), max=(2, 2, 2)))
+    assert facts.warnings == ("scan `b.ply`: `keep` and `remove` leave none of its points",)
+    assert facts.bounds[0].tolist() == [[1, 1, 1], [1, 1, 1]]
+    assert np.isnan(facts.bounds[1]).all()
+
+
+def test_each_place_counts_once(tmp_path):
+    points = np.float32([[0.0, 1, 2], [3, 4, 5], [-0.0, 1, 2], [3, 4, 5.5], [3, 4, 5]])
+    cloud, _, _ = read_room([ply(tmp_path / "a.ply", points, np.uint8(10 * points))])
+    left = without_repeats(cloud)
+    assert left.points.tolist() == [[0, 1, 2], [3, 4, 5], [3, 4, 5.5]]
+    assert left.colors.tolist() == [[0, 10, 20], [30, 40, 50], [30, 40, 55]]
+    assert without_repeats(left) is left
+
+
 @pytest.mark.parametrize(
     ("points", "keep", "said", "hint"),
     [
@@ -91,7 +131,7 @@ def test_a_scan_without_color_is_grey_with_a_warning(tmp_path):
             "found 99, 9 invalid ones dropped",
             "lower",
         ),
-        (np.ones((500, 3)), Box(min=(2, 2, 2), max=(3, 3, 3)), "found 0, 500 cropped", "keep"),
+        (np.ones((500, 3)), Box(min=(2, 2, 2), max=(3, 3, 3)), "found 0, 500 cropped", "[1.00"),
     ],
 )
 def test_too_few_points_are_told_with_what_became_of_the_others(tmp_path, points, keep, said, hint):

@@ -203,7 +203,7 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(folder):
             kitchen + "text: expected a file, found none at `texts/a.fr.md`",
             "did you mean `texts/a.en.md`?",
         ),
-        (kitchen + "keep: expected min below max along y, found 0 and -1", ""),
+        (kitchen + "keep: expected min below max along y, found 0 and -1", "swap them"),
         (
             kitchen
             + "surface.detial_mm: unknown key, expected one of agree_deg, crease_deg, depth, "
@@ -232,6 +232,17 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(folder):
         ("detail_mm = 4", "detail_mm: unknown key", "did you mean `surface.detail_mm`?"),
         ("zzzzzz = 4", "zzzzzz: unknown key", ""),
         ('unit = "inch"', 'unit: expected one of m, cm, mm, ft, found "inch"', ""),
+        ('unit = "km"', 'unit: expected one of m, cm, mm, ft, found "km"', ""),
+        ('unit = "MM"', 'unit: expected one of m, cm, mm, ft, found "MM"', "mean `mm`?"),
+        ('unit = "feet"', "unit: expected one of", "did you mean `ft`?"),
+        ('unit = "metres"', "unit: expected one of", "did you mean `m`?"),
+        ('unit = "Millimeter"', "unit: expected one of", "did you mean `mm`?"),
+        ('unit = "centimetres"', "unit: expected one of", "did you mean `cm`?"),
+        ('up = "Z"', 'up: expected one of z, -z, y, -y, x, -x, found "Z"', "did you mean `z`?"),
+        ('up = "+y"', "up: expected one of", "did you mean `y`?"),
+        ('up = "-Y"', "up: expected one of", "did you mean `-y`?"),
+        ('up = "z-up"', "up: expected one of", "did you mean `z`?"),
+        ('up = "north"', "up: expected one of", ""),
         ("unit = 1", "unit: expected one of m, cm, mm, ft, found 1", ""),
         ('stations = "atuo"', 'expected "auto" or a list of positions', ""),
         ("stations = []", 'expected "auto" or a list of positions', ""),
@@ -247,11 +258,6 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(folder):
         ("clean = { min_points = true }", "expected a whole number, found true", ""),
         ("clean = { min_points = 5 }", "clean.min_points: expected at least 100, found 5", ""),
         (
-            'surface = { method = "poisson", depth = 99 }',
-            "surface.depth: expected at most 12, found 99",
-            "",
-        ),
-        (
             "surface = { depth = 9 }",
             'surface.depth: expected this key with method "poisson", found method "auto"',
             'set `method = "poisson"`',
@@ -260,11 +266,6 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(folder):
             'surface = { method = "crust", reach = 2 }',
             'reach: expected this key with method "auto" or "signed-distance", found',
             "leave it out",
-        ),
-        (
-            'surface = { method = "ball-pivoting", radii_mm = [] }',
-            "surface.radii_mm: expected at least one, found []",
-            "",
         ),
         ("surface = { solver_divide = 8 }", "solver_divide: unknown key", "older, unscreened"),
         ('surface = { detail_mm = "4" }', 'detail_mm: expected a number, found "4"', ""),
@@ -292,6 +293,54 @@ def test_a_wrong_value_is_told_with_its_key(folder, lines, said, hint):
     assert message.startswith("room `kitchen`: ")
     assert said in message
     assert hint in found_hint
+
+
+@pytest.mark.parametrize(
+    ("method", "value", "said"),
+    [
+        ("poisson", "depth = 4", "depth: expected 5 to 12, found 4"),
+        ("poisson", "depth = 99", "depth: expected 5 to 12, found 99"),
+        ("poisson", "depth = 8.5", "depth: expected a whole number, found 8.5"),
+        ("poisson", "full_depth = 0", "full_depth: expected 1 to 8, found 0"),
+        ("poisson", "full_depth = 9", "full_depth: expected 1 to 8, found 9"),
+        (
+            "poisson",
+            "depth = 6, full_depth = 7",
+            "full_depth: expected at most `depth`, 6, found 7",
+        ),
+        ("poisson", "samples_per_node = 0", "samples_per_node: expected 0.5 to 20, found 0"),
+        ("poisson", "samples_per_node = 99", "samples_per_node: expected 0.5 to 20, found 99"),
+        ("poisson", "point_weight = -1", "point_weight: expected 0 to 100, found -1"),
+        ("poisson", "point_weight = nan", "point_weight: expected a finite number, found nan"),
+        ("poisson", "linear_fit = 1", "linear_fit: expected true or false, found 1"),
+        ("ball-pivoting", "radii_mm = []", "radii_mm: expected 1 to 8 of them, found []"),
+        (
+            "ball-pivoting",
+            "radii_mm = [1, 2, 3, 4, 5, 6, 7, 8, 9]",
+            "radii_mm: expected 1 to 8 of them, found [1, 2, 3, 4, 5, 6, 7, 8, 9]",
+        ),
+        ("ball-pivoting", "radii_mm = 10", "radii_mm: expected a list, found 10"),
+        ("ball-pivoting", "radii_mm = [5, -5]", "radii_mm 2: expected 0.1 to 1000, found -5"),
+        ("ball-pivoting", "radii_mm = [2000]", "radii_mm 1: expected 0.1 to 1000, found 2000"),
+        (
+            "ball-pivoting",
+            "radii_mm = [10, 10]",
+            "radii_mm: expected each larger than the one before, found [10, 10]",
+        ),
+        ("ball-pivoting", "agree_deg = 9", "agree_deg: expected 10 to 90, found 9"),
+        ("auto", "neighbours = 2", "neighbours: expected 4 to 64, found 2"),
+        ("signed-distance", "crease_deg = 90", "crease_deg: expected 3 to 45, found 90"),
+        ("auto", "reach = 0", "reach: expected 0.5 to 5, found 0"),
+        ("crust", "filter_deg = 120", "filter_deg: expected 10 to 90, found 120"),
+        ("auto", "detail_mm = 0.5", "detail_mm: expected 1 to 500, found 0.5"),
+        ("crust", "offset_mm = 101", "offset_mm: expected -100 to 100, found 101"),
+    ],
+)
+def test_a_setting_of_the_surface_that_cannot_be_is_told_with_its_range(
+    folder, method, value, said
+):
+    ((message, _),) = room_faults(folder, f'surface = {{ method = "{method}", {value} }}')
+    assert message == f"room `kitchen`: surface.{said}"
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,18 @@ from typing import Any
 
 import numpy as np
 
+from tourgen.errors import InputError
 from tourgen.fitting.lengths import Corner, corners, detail_m
+from tourgen.fitting.plausible import require_room
 from tourgen.geometry import Float64, OrientedCloud, Panorama, PointCloud
-from tourgen.scans import ReadFacts, read_panoramas, read_room
+from tourgen.scans import ReadFacts, read_panoramas, read_room, without_repeats
 from tourgen.stages import exposure, floor, normals, ownership, register, sift, stations, thin
 from tourgen.stages.spacing import Spacing
 from tourgen.tour import Room, open_scans
+
+_SPACING_MM = (0.1, 1000.0)
+_LEAST_POINTS = 100
+"""Fewer tell no surface."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +90,18 @@ def reading(room: Room) -> Reading:
 
 
 def read(room: Room, folder: Path, _: Reading) -> RoomScan:
-    """Read a room's scans; the settings are those of the room, gathered for the key."""
+    """Read a room's scans; the settings are those of the room, gathered for the key.
+
+    Raises:
+        InputError: A scan cannot be read, or what they hold cannot be a room.
+    """
     scans = open_scans(room, folder)
     cloud, found, facts = read_room(scans, room.keep, room.remove, room.clean.min_points)
+    count = len(cloud)
+    cloud = without_repeats(cloud)
+    facts = replace(facts, dropped_repeated=count - len(cloud))
+    told = require_room(cloud.points, room, facts)
+    facts = replace(facts, warnings=(*facts.warnings, *told))
     panoramas = read_panoramas(scans, cloud.origin)
     if room.stations == "auto":
         return RoomScan(cloud, found, panoramas, facts)
@@ -148,10 +163,35 @@ def thinned(cloud: PointCloud, spacing: Spacing, asked: Thinning) -> PointCloud:
 
     A scan denser than the detail is thinned further, toward a point a cell: each is the mean of
     so many that more would only cost.
+
+    Raises:
+        InputError: No room can be made of so few points, or with such a detail.
     """
+    spacing_mm = 1000 * spacing.median_m
+    if not _SPACING_MM[0] <= spacing_mm <= _SPACING_MM[1]:
+        raise InputError(
+            f"scan: expected points {_SPACING_MM[0]:g} to {_SPACING_MM[1]:g} mm apart in the "
+            f"middle, found {spacing_mm:.2g} mm",
+            "check the export and `unit`",
+        )
+    most_mm = 100 * float(np.ptp(cloud.points, axis=0).max())
+    if asked.detail_mm and asked.detail_mm > most_mm:
+        raise InputError(
+            f"surface.detail_mm: expected 1 to {most_mm:.3g}, a tenth of the room, "
+            f"found {asked.detail_mm:g}",
+            "leave it out: it follows from the scan",
+        )
     detail = detail_m(spacing, asked.detail_mm)
     voxel_m = max(detail / 2, detail - spacing.median_m / 2)
-    return thin.thin(cloud, thin.Settings(asked.thin_mm / 1000 if asked.thin_mm else voxel_m))
+    voxel_m = asked.thin_mm / 1000 if asked.thin_mm else voxel_m
+    left = thin.thin(cloud, thin.Settings(voxel_m))
+    if len(left) < _LEAST_POINTS:
+        raise InputError(
+            f"surface: expected {_LEAST_POINTS} points or more, found {len(left)} once they were "
+            f"thinned to {1000 * voxel_m:.3g} mm",
+            "lower `surface.detail_mm` or `clean.thin_mm`",
+        )
+    return left
 
 
 def oriented(

@@ -2,6 +2,7 @@
 
 from tourgen.scans.mesh import read_mesh
 from tourgen.scans.open import FORMATS, open_scan
+from tourgen.scans.repeats import without_repeats
 from tourgen.scans.room import ReadFacts, read_panoramas, read_room
 from tourgen.scans.scan import Chunk, Frame, Scan
 
@@ -15,4 +16,5 @@ __all__ = [
     "read_mesh",
     "read_panoramas",
     "read_room",
+    "without_repeats",
 ]

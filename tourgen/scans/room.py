@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, Protocol
 
 import numpy as np
@@ -41,12 +41,67 @@ class ReadFacts:
         dropped_invalid: Marked as invalid, not a number, or infinite.
         dropped_cropped: Outside `keep` or inside a box of `remove`.
         warnings: What the publisher should know, one line each.
+        bounds: (s, 2, 3) float64, metres, lowest and highest corner of what each scan left; NaN
+            where that is nothing.
+        dropped_repeated: At the very place of another one.
     """
 
     points_read: int
     dropped_invalid: int
     dropped_cropped: int
     warnings: tuple[str, ...]
+    bounds: Float64 = field(default_factory=lambda: np.empty((0, 2, 3)))
+    dropped_repeated: int = 0
+
+
+@dataclass(slots=True)
+class _Part:
+    """What one of the scans holds, as far as it was read.
+
+    Attributes:
+        scan: The scan.
+        first: Where its points start in the room's arrays.
+        bounds: (2, 3) float64, lowest and highest corner, metres; and
+        kept: of what the crop left; NaN where that is nothing.
+        colored: Whether points of it have colours, and
+        lit: whether one of these is not black.
+    """
+
+    scan: Scan
+    first: int
+    bounds: Float64 = field(default_factory=lambda: np.full((2, 3), np.nan))
+    kept: Float64 = field(default_factory=lambda: np.full((2, 3), np.nan))
+    colored: bool = False
+    lit: bool = False
+
+    def add(self, chunk: Chunk, inside: Chunk) -> None:
+        """Take note of a chunk and of what the crop left of it."""
+        self.bounds = _spanned(self.bounds, chunk.points)
+        self.kept = _spanned(self.kept, inside.points)
+        self.colored |= chunk.colors is not None
+        self.lit |= chunk.colors is not None and bool(chunk.colors.any())
+
+    @property
+    def black(self) -> bool:
+        """Whether its colours tell nothing."""
+        return self.colored and not self.lit
+
+    @property
+    def warnings(self) -> Iterator[str]:
+        """What the publisher should know, one line each."""
+        yield from self.scan.warnings
+        if self.black:
+            yield f"scan `{self.scan.name}`: has colours that are all black, its points are grey"
+        if np.isnan(self.kept[0, 0]) and not np.isnan(self.bounds[0, 0]):
+            yield f"scan `{self.scan.name}`: `keep` and `remove` leave none of its points"
+
+
+def _spanned(bounds: Float64, points: Float64) -> Float64:
+    """Bounds wide enough for more points."""
+    if not len(points):
+        return bounds
+    low, high = points.min(axis=0), points.max(axis=0)
+    return np.array([np.fmin(bounds[0], low), np.fmax(bounds[1], high)])
 
 
 def read_room(
@@ -81,26 +136,35 @@ def read_room(
     colors = np.empty((capacity, 3), np.uint8)
     station = np.empty(capacity, np.int16)
     origin: Float64 | None = None
+    parts: list[_Part] = []
     used = invalid = cropped = 0
-    for chunk in _numbered(scans):
-        if origin is None and len(chunk.points):
-            origin = _origin(chunk.points)
-        inside = _cropped(chunk, keep, remove)
-        part = slice(used, used + len(inside.points))
-        points[part] = inside.points if origin is None else inside.points - origin
-        colors[part] = GREY if inside.colors is None else inside.colors
-        station[part] = inside.station
-        invalid += chunk.dropped
-        cropped += len(chunk.points) - len(inside.points)
-        used = part.stop
+    for scan, first_station in _numbered(scans):
+        part = _Part(scan, used)
+        for chunk in scan.chunks():
+            if origin is None and len(chunk.points):
+                origin = _origin(chunk.points)
+            inside = _cropped(chunk, keep, remove)
+            end = used + len(inside.points)
+            points[used:end] = inside.points if origin is None else inside.points - origin
+            colors[used:end] = GREY if inside.colors is None else inside.colors
+            known = inside.station >= 0
+            station[used:end] = np.where(known, inside.station + first_station, -1)
+            invalid += chunk.dropped
+            cropped += len(chunk.points) - len(inside.points)
+            used = end
+            part.add(chunk, inside)
+        if part.black:
+            colors[part.first : used] = GREY
+        parts.append(part)
     facts = ReadFacts(
         points_read=used + invalid + cropped,
         dropped_invalid=invalid,
         dropped_cropped=cropped,
-        warnings=tuple(warning for scan in scans for warning in scan.warnings),
+        warnings=tuple(warning for part in parts for warning in part.warnings),
+        bounds=np.stack([part.kept for part in parts]),
     )
     if used < max(1, min_points):
-        raise _too_few(scans, used, max(1, min_points), facts)
+        raise _too_few(parts, used, max(1, min_points), facts)
     if origin is None:
         origin = np.zeros(3)
     cloud = PointCloud(origin, points[:used], colors[:used], station[:used])
@@ -125,14 +189,11 @@ def read_panoramas(scans: Sequence[Scan], origin: Float64) -> tuple[Panorama, ..
     )
 
 
-def _numbered(scans: Sequence[Scan]) -> Iterator[Chunk]:
-    """All chunks, the stations of one scan numbered on from those of the scan before."""
+def _numbered(scans: Sequence[Scan]) -> Iterator[tuple[Scan, int]]:
+    """Each scan with the number of its first station, counted on from those of the scan before."""
     first = 0
     for scan in scans:
-        for chunk in scan.chunks():
-            known = chunk.station >= 0
-            station = np.where(known, chunk.station + first, -1).astype(np.int16)
-            yield Chunk(chunk.points, chunk.colors, station, chunk.dropped)
+        yield scan, first
         first += len(scan.stations)
 
 
@@ -161,8 +222,17 @@ def _within(points: Float64, box: Box) -> npt.NDArray[np.bool_]:
     return within
 
 
-def _too_few(scans: Sequence[Scan], used: int, needed: int, facts: ReadFacts) -> InputError:
-    names = " + ".join(f"`{scan.name}`" for scan in scans)
+def _corners(bounds: Float64) -> tuple[str, str]:
+    """The lowest and the highest of several corners, as tour.toml writes them."""
+    low, high = np.nanmin(bounds, axis=0), np.nanmax(bounds, axis=0)
+    first, second = (
+        ", ".join(f"{value:.2f}" for value in np.round(corner, 2) + 0.0) for corner in (low, high)
+    )
+    return f"[{first}]", f"[{second}]"
+
+
+def _too_few(parts: Sequence[_Part], used: int, needed: int, facts: ReadFacts) -> InputError:
+    names = " + ".join(f"`{part.scan.name}`" for part in parts)
     causes = [
         f"{count} {why}"
         for count, why in (
@@ -171,11 +241,10 @@ def _too_few(scans: Sequence[Scan], used: int, needed: int, facts: ReadFacts) ->
         )
         if count
     ]
-    hint = (
-        "check `keep`, `remove`, `unit` and `up`"
-        if facts.dropped_cropped
-        else "check the export, or lower `clean.min_points`"
-    )
+    hint = "check the export, or lower `clean.min_points`"
+    if facts.dropped_cropped:
+        low, high = _corners(np.concatenate([part.bounds for part in parts]))
+        hint = f"the points reach from {low} to {high}: check `keep`, `remove`, `unit` and `up`"
     wanted = f"at least {needed} points" if needed > 1 else "points"
     return InputError(
         f"scan {names}: expected {wanted}, found {', '.join([str(used), *causes])}",

@@ -158,7 +158,8 @@ def register(cloud: PointCloud, stations: Float64, settings: Settings) -> Regist
     if len(active) > 1 and active[0] >= 0:
         views = tuple(_view(cloud, stations, number, settings) for number in active)
         places = stations[active]
-        turned, shifted = _held(*_aligned(views, active, settings), places)
+        names = tuple(_name(int(number), stations[number] + cloud.origin) for number in active)
+        turned, shifted = _held(*_aligned(views, names, settings), places)
         if _farthest(turned, shifted, places) > settings.least_m:
             rotations[active], translations[active] = turned, shifted
     moved = np.einsum("sij,sj->si", rotations, stations) + translations
@@ -170,6 +171,12 @@ def register(cloud: PointCloud, stations: Float64, settings: Settings) -> Regist
         np.linalg.norm(moved - stations, axis=1) * 1000,
         np.degrees(Rotation.from_matrix(rotations).magnitude()),
     )
+
+
+def _name(number: int, place: Float64) -> str:
+    """How messages call a station: those that were found have nothing but a place."""
+    x, y, z = place
+    return f"{number + 1} at [{x:.1f}, {y:.1f}, {z:.1f}]"
 
 
 def _probes(places: Float64) -> Float64:
@@ -243,7 +250,7 @@ def _slope(tree: cKDTree, points: Float32, normal: Float32, light: Float32) -> F
 
 
 def _aligned(
-    views: tuple[_View, ...], names: npt.NDArray[np.generic], settings: Settings
+    views: tuple[_View, ...], names: tuple[str, ...], settings: Settings
 ) -> tuple[Float64, Float64]:
     """Rotations and translations of all views."""
     rotations = np.tile(np.eye(3), (len(views), 1, 1))
@@ -305,7 +312,7 @@ def _partners(
 
 
 def _overlapping(
-    met: dict[tuple[int, int], _Partners], names: npt.NDArray[np.generic], needed: float
+    met: dict[tuple[int, int], _Partners], names: tuple[str, ...], needed: float
 ) -> list[tuple[int, int]]:
     """The pairs that overlap.
 
@@ -319,9 +326,9 @@ def _overlapping(
     if apart:
         one, other = max(apart, key=lambda pair: apart[pair])
         raise InputError(
-            f"stations {int(names[one]) + 1} and {int(names[other]) + 1}: expected an overlap of "
-            f"{needed:.0%} or more, found {apart[one, other]:.0%}",
-            "check their poses, or give each part a room of its own",
+            f"stations {names[one]} and {names[other]}: expected an overlap of {needed:.0%} or "
+            f"more, found {apart[one, other]:.0%}",
+            "check their `pose`, or give each part a room of its own",
         )
     return pairs
 

@@ -160,5 +160,5 @@ def _require(found: int, needed: int, when: str) -> None:
     if found < needed:
         raise InputError(
             f"expected at least {needed} points{when}, found {found}",
-            "check the export and the keep box, or lower `clean.min_points`",
+            "check the export, `unit` and `keep`, or lower `clean.min_points`",
         )

@@ -106,7 +106,7 @@ def ball_pivoting(oriented: OrientedCloud, settings: Settings) -> Mesh:
     if not len(mesh.faces):
         raise StageError(
             "surface: expected faces, found that no ball rests on three points",
-            "check the normals, or give larger radii",
+            "check the normals, or give larger `surface.radii_mm`",
         )
     return mesh
 
@@ -117,7 +117,13 @@ def _require_match(points: Float32, first_m: float) -> None:
     rng = np.random.default_rng(0)
     sample = points[rng.choice(len(points), min(_SAMPLE, len(points)), replace=False)]
     dense_m, median_m = np.quantile(spacing_at(cKDTree(points), sample), [0.1, 0.5])
-    require_range("first of radii_m", first_m, _FIRST[0] * median_m, _FIRST[1] * dense_m)
+    low_m, high_m = _FIRST[0] * median_m, _FIRST[1] * dense_m
+    if not low_m <= first_m <= high_m:
+        raise InputError(
+            f"surface.radii_mm: expected the first from {1000 * low_m:.3g} to "
+            f"{1000 * high_m:.3g}, found {1000 * first_m:.3g}",
+            f"the points lie {1000 * median_m:.3g} mm apart in the middle",
+        )
 
 
 def _agreement(mesh: Mesh, normals: Float32) -> Float32:

@@ -45,7 +45,7 @@ _FARTHEST = 3.0
 """Poles farther from the middle, in diagonals of the cloud, are as good as at infinity."""
 _SAME = 1e-9
 """Poles nearer to each other, in diagonals, are one."""
-_OTHERS = "thin the scan, or take poisson, signed-distance or ball-pivoting"
+_OTHERS = "take auto, poisson, signed-distance or ball-pivoting, or raise `clean.thin_mm`"
 
 Mask = npt.NDArray[np.bool_]
 

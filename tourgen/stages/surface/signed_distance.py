@@ -132,7 +132,8 @@ def signed_distance(oriented: OrientedCloud, settings: Settings) -> Mesh:
     mesh = distances(planes, settings).zero_set(oriented.cloud.origin)
     if not len(mesh.faces):
         raise StageError(
-            "surface: expected a surface, found none", "check the normals, or take larger cells"
+            "surface: expected a surface, found none",
+            "lower `surface.detail_mm` toward the spacing of the points, or take poisson",
         )
     return mesh
 
