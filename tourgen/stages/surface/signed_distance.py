@@ -42,9 +42,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from tourgen.errors import StageError
 from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud
+from tourgen.stages.sift.strays import clusters
 from tourgen.stages.surface.field import Field
 from tourgen.stages.surface.growing import grown
 from tourgen.stages.surface.marching_cubes import (
@@ -62,7 +64,11 @@ from tourgen.stages.surface.tangent_planes import (
     tangent_planes,
 )
 
-VERSION = 4
+VERSION = 5
+_APART = 3.0
+"""Spacings between points that stand apart."""
+_HANDFUL = 12
+"""Fewer points that stand apart from all others are strays."""
 _STEEPEST = 1.8
 """Most change of the distance over the way: 1, and more for the blend and for what was hardly seen.
 At 1.2 edges gape of which one side was (chamber1: 98.97 instead of 99.24 % of what is seen within
@@ -153,12 +159,25 @@ def supported_planes(oriented: OrientedCloud, settings: Settings) -> TangentPlan
     smoothing = Smoothing(settings.neighbours, settings.crease_deg, noise_m)
     planes = tangent_planes(oriented, smoothing)
     planes = planes.take(planes.support >= settings.support)
+    planes = planes.take(~_few(planes.points, settings.spacing_m))
     if not len(planes.points):
         raise StageError(
             "surface: expected points that agree on a surface, found none",
             "check the normals, or thin the scan less",
         )
     return planes
+
+
+def _few(points: Float32, spacing_m: float) -> npt.NDArray[np.bool_]:
+    """Mask of the points that stand apart in a handful: strays, which would draw a lump in the air.
+
+    None where all do: a scan so sparse has no strays that could be told.
+    """
+    if not len(points):
+        return np.zeros(0, bool)
+    cluster = clusters(points, _APART * spacing_m)
+    few = np.bincount(cluster)[cluster] < _HANDFUL
+    return few & (not few.all())
 
 
 @dataclass(frozen=True, slots=True)
