@@ -129,6 +129,20 @@ def test_a_lone_point_in_the_air_makes_no_surface() -> None:
     assert np.abs(mesh.vertices[:, 2]).max() < 0.01
 
 
+def test_a_handful_of_points_that_stand_apart_make_no_surface() -> None:
+    """Five strays that agree with each other, as a tripod's or a passer-by's leftovers do."""
+    wall = flat(2_000)
+    strays = np.float32([[0.5, 0.5, 0.5]]) + np.float32(
+        [[0, 0, 0], [0.03, 0, 0], [0, 0.03, 0], [-0.03, 0, 0], [0, -0.03, 0]]
+    )
+    both = cloud(
+        np.concatenate([wall.cloud.points, strays]),
+        np.concatenate([wall.normals, np.float32([[0, 0, 1]] * 5)]),
+    )
+    mesh = signed_distance(both, FINE)
+    assert np.abs(mesh.vertices[:, 2]).max() < 0.1
+
+
 def test_memory_follows_the_area_not_the_room() -> None:
     """Two sheets 150 m apart: a full grid would have 10^12 cells."""
     sheet = flat(2_500)
