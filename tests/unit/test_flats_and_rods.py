@@ -49,8 +49,9 @@ def rail(rng: np.random.Generator, radius_m: float = 0.01) -> tuple[np.ndarray, 
 
 def test_walls_become_flat_and_their_corner_keeps_its_place() -> None:
     points, normals = corner(np.random.default_rng(0))
-    flat, on = flattened(planes_of(points, normals), SPACING_M)
+    flat, flats = flattened(planes_of(points, normals), SPACING_M)
     half = len(points) // 2
+    on = flats.broad
     assert on.mean() > 0.98
     floor, wall = on.copy(), on.copy()
     floor[half:], wall[:half] = False, False
@@ -65,8 +66,8 @@ def test_walls_become_flat_and_their_corner_keeps_its_place() -> None:
 def test_what_bends_stays_as_it_is() -> None:
     ball = trimesh.creation.icosphere(6, 0.4)
     told = planes_of(ball.vertices, ball.vertex_normals)
-    flat, on = flattened(told, SPACING_M)
-    assert on.mean() < 0.05
+    flat, flats = flattened(told, SPACING_M)
+    assert flats.broad.mean() < 0.05
     radius = np.linalg.norm(flat.points, axis=1)
     assert np.abs(radius - 0.4).max() < 3 * NOISE_M
 
@@ -76,8 +77,8 @@ def test_a_rail_seen_from_one_side_is_found_and_a_wall_is_none() -> None:
     (points, normals), (more, outward) = corner(rng), rail(rng)
     points, normals = np.concatenate([points, more]), np.concatenate([normals, outward])
     told = planes_of(points, normals)
-    _, on = flattened(told, SPACING_M)
-    found, theirs = rods(told, told.points, ~on, SPACING_M)
+    _, flats = flattened(told, SPACING_M)
+    found, theirs = rods(told, told.points, ~flats.broad, SPACING_M)
     assert len(found) == 1
     (rod,) = found
     assert abs(rod.radius_m - 0.01) < 0.002

@@ -15,7 +15,7 @@ from tourgen.errors import StageError
 from tourgen.geometry import Mesh
 from tourgen.stages.mesh_arrays import compact, components, edges, face_adjacency, face_areas
 
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Settings:
         crumb_area_m2: Components smaller than this go.
     """
 
-    crumb_area_m2: float = 0.01
+    crumb_area_m2: float = 0.005
 
 
 def hygiene(mesh: Mesh, settings: Settings) -> Mesh:

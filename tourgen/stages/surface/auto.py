@@ -4,7 +4,8 @@ Near points, Hoppe's distance draws flat walls flat and edges sharp, and costs l
 the points do. The solve closes every gap smoothly, but rounds every edge off and costs most of a
 build at the same detail. So the solve is made with coarser cells, from points spread evenly over
 the surface that the distance drew. Over the last part of a plane's reach the distance fades into
-that to the solved surface: there is one field, and one watertight mesh.
+that to the solved surface: there is one field, and one watertight mesh, beside which thin rods
+stand as tubes of their own.
 
 Tried: the solve from the tangent planes themselves. A board of 25 mm whose one side is seen at a
 grazing angle only, with its points in sparse rows, dissolved, and the surface bulged out into the
@@ -30,7 +31,7 @@ from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.stages.thin import voxel_groups
 
-VERSION = 2
+VERSION = 3
 Mask = npt.NDArray[np.bool_]
 
 
@@ -79,7 +80,8 @@ def auto(oriented: OrientedCloud, settings: Settings) -> Chosen:
         InputError: The room has more than two million cells from end to end.
         StageError: There is no surface.
     """
-    planes = signed_distance.supported_planes(oriented, settings.distance)
+    shapes = signed_distance.shapes(oriented, settings.distance)
+    planes = shapes.planes
     known = signed_distance.distances(planes, settings.distance)
     dense = known.zero_set(oriented.cloud.origin)
     if not len(dense.faces):
@@ -90,7 +92,8 @@ def auto(oriented: OrientedCloud, settings: Settings) -> Chosen:
         return Chosen(poisson.poisson(oriented, settings.alone), 0.0)
     gap = ~_near(solved, planes, reach_m)
     mesh = known.carried_on(_Closed(solved, gap)).zero_set(oriented.cloud.origin)
-    return Chosen(mesh, _share(mesh, planes, reach_m))
+    share = _share(mesh, planes, reach_m)
+    return Chosen(shapes.with_rods(mesh, settings.distance), share)
 
 
 def _evenly(mesh: Mesh, settings: Settings) -> OrientedCloud:

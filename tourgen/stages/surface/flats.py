@@ -14,7 +14,7 @@ What bends is no plane: a patch is refused where a paraboloid fits it better by 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +22,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order
 from scipy.spatial import cKDTree
 
-from tourgen.geometry import Float64
+from tourgen.geometry import Float32, Float64
 from tourgen.stages.mesh_arrays import components
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 
@@ -61,31 +61,38 @@ class _Surfels:
         points: (m, 3) metres.
         normals: (m, 3) unit.
         edge_m: Of the voxels.
+        of: (n,) number of the surfel that each tangent plane is of, -1 where of none.
     """
 
     points: Float64
     normals: Float64
     edge_m: float
+    of: Ints
 
 
 @dataclass(frozen=True, slots=True)
 class Flats:
-    """Planes of a room.
+    """Planes of a room, and what lies on them.
 
     Attributes:
         normals: (p, 3) unit, toward the free space.
         offsets_m: (p,) along them.
         narrow: (p,) mask of those no wider than a surfel: a board's edge, or a rail taken for one.
-        surfel: (m,) number of the plane that each surfel lies on, -1 where on none.
+        of: (n,) number of the plane that each tangent plane lies on, -1 where on none.
     """
 
     normals: Float64
     offsets_m: Float64
     narrow: Mask
-    surfel: Ints
+    of: Ints
+
+    @property
+    def broad(self) -> Mask:
+        """(n,) which tangent planes lie on a flat that is no mere strip."""
+        return (self.of >= 0) & ~np.append(self.narrow, True)[self.of]
 
 
-def flattened(planes: TangentPlanes, spacing_m: float) -> tuple[TangentPlanes, Mask]:
+def flattened(planes: TangentPlanes, spacing_m: float) -> tuple[TangentPlanes, Flats]:
     """Move the tangent planes that lie on a common plane onto it.
 
     Args:
@@ -93,11 +100,12 @@ def flattened(planes: TangentPlanes, spacing_m: float) -> tuple[TangentPlanes, M
         spacing_m: Distance between neighbouring points in the middle of the room.
 
     Returns:
-        The tangent planes, and the mask of those on a flat that is no mere strip.
+        The tangent planes, and the flats on which they lie.
     """
     surfels = _surfels(planes, _SURFEL * spacing_m)
     flats = _grown(surfels, planes.noise_m)
-    return _moved(planes, surfels, flats)
+    label = _straight(planes, np.append(flats.of, -1)[surfels.of], flats)[flats.of]
+    return _moved(planes, surfels, replace(flats, of=label))
 
 
 def _surfels(planes: TangentPlanes, edge_m: float) -> _Surfels:
@@ -114,24 +122,30 @@ def _surfels(planes: TangentPlanes, edge_m: float) -> _Surfels:
     )
     length = np.linalg.norm(normal, axis=1)
     sound = (length > _COHERENT) & (count > 1)
-    return _Surfels(point[sound], normal[sound] / length[sound, None], edge_m)
+    number = np.where(sound, np.cumsum(sound) - 1, -1)
+    return _Surfels(point[sound], normal[sound] / length[sound, None], edge_m, number[group])
 
 
 def _grown(surfels: _Surfels, noise_m: float) -> Flats:
-    """Grow planes, in each part of the surface that runs on without a crease for itself."""
+    """Grow planes, in each part of the surface that runs on without a crease for itself.
+
+    Returns:
+        The flats, with the surfels on them.
+    """
     first, second, calm = _neighbours(surfels, _OFF * noise_m)
     count = len(surfels.points)
     part = components(np.stack([first, second], axis=1), count)
+    parts = int(part.max(initial=-1)) + 1
     order = np.argsort(part, kind="stable")
-    starts = np.searchsorted(part[order], np.arange(part.max() + 2))
+    starts = np.searchsorted(part[order], np.arange(parts + 1))
     of_pair = np.argsort(part[first], kind="stable")
-    pair_starts = np.searchsorted(part[first][of_pair], np.arange(part.max() + 2))
+    pair_starts = np.searchsorted(part[first][of_pair], np.arange(parts + 1))
     number = np.empty(count, np.int64)
     label = np.full(count, -1)
     normals: list[Float64] = []
     offsets: list[float] = []
     narrow: list[bool] = []
-    for k in range(len(starts) - 1):
+    for k in range(parts):
         own = order[starts[k] : starts[k + 1]]
         if not _large(len(own), surfels.edge_m):
             continue
@@ -256,18 +270,50 @@ def _bends(points: Float64, normal: Float64, offset: float, most_m: float) -> bo
     return bool(np.sqrt(np.square(found).mean()) > most_m)
 
 
-def _moved(planes: TangentPlanes, surfels: _Surfels, flats: Flats) -> tuple[TangentPlanes, Mask]:
-    """The tangent planes, those near a flat on it, and which these are."""
-    lain = np.flatnonzero(flats.surfel >= 0)
+def _straight(planes: TangentPlanes, label: Ints, flats: Flats) -> Ints:
+    """(p + 1,) number of each flat; -1 where its normals turn as a bent surface's would, and last.
+
+    A strip may be too narrow for its surfels' heights to tell.
+
+    Args:
+        planes: n tangent planes.
+        label: (n,) the flat that each is of, -1 where of none.
+        flats: p of them.
+    """
+    own = np.flatnonzero(label >= 0)
+    label, count = label[own], len(flats.normals)
+    across = np.linalg.svd(flats.normals[:, None])[2][:, 1:].astype(np.float32)
+
+    def mean(values: Float32) -> Float64:
+        number = np.maximum(np.bincount(label, minlength=count), 1)
+        return np.asarray(np.bincount(label, values, minlength=count) / number)
+
+    def apart(values: Float32) -> Float32:
+        found = np.einsum("nij,nj->ni", across[label], values[own])
+        return np.asarray(found - np.stack([mean(each) for each in found.T], 1)[label], np.float32)
+
+    at, turn = apart(planes.points), apart(planes.normals)
+    spread = np.stack([[mean(x * y) for x in at.T] for y in at.T]).transpose(2, 0, 1)
+    turned = np.stack([[mean(x * y) for x in at.T] for y in turn.T]).transpose(2, 0, 1)
+    bend = turned @ np.linalg.pinv(spread)
+    height = np.einsum("ni,nij,nj->n", at, bend[label].astype(np.float32), at) / 2
+    height -= mean(height).astype(np.float32)[label]
+    bent = np.sqrt(mean(np.square(height))) > _BENT * planes.noise_m
+    return np.append(np.where(bent, -1, np.arange(count)), -1)
+
+
+def _moved(planes: TangentPlanes, surfels: _Surfels, flats: Flats) -> tuple[TangentPlanes, Flats]:
+    """The tangent planes, those near a flat on it; the flats, with these instead of surfels."""
+    lain = np.flatnonzero(flats.of >= 0)
     if not len(lain):
-        return planes, np.zeros(len(planes.points), bool)
+        return planes, replace(flats, of=np.full(len(planes.points), -1))
     _, near = cKDTree(surfels.points[lain]).query(
         planes.points,
         k=range(1, _AROUND + 1),
         distance_upper_bound=1.5 * surfels.edge_m,
         workers=-1,
     )
-    label = np.append(flats.surfel[lain], -1)[near]
+    label = np.append(flats.of[lain], -1)[near]
     best = np.full(len(planes.points), np.inf, np.float32)
     chosen = np.full(len(planes.points), -1)
     height_at = np.zeros(len(planes.points), np.float32)
@@ -289,4 +335,4 @@ def _moved(planes: TangentPlanes, surfels: _Surfels, flats: Flats) -> tuple[Tang
     points[on] -= height_at[on, None] * normals[on]
     support[on] = 1
     moved = TangentPlanes(points, normals, planes.spacing_m, support, planes.noise_m)
-    return moved, (chosen >= 0) & ~np.append(flats.narrow, True)[chosen]
+    return moved, replace(flats, of=chosen)

@@ -38,7 +38,7 @@ eighths have no point within 10 mm), F-score at 5 mm 0.978; 53 s of the processo
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -48,6 +48,7 @@ from tourgen.errors import StageError
 from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud
 from tourgen.stages.sift.strays import clusters
 from tourgen.stages.surface.field import Field
+from tourgen.stages.surface.flats import flattened
 from tourgen.stages.surface.growing import grown
 from tourgen.stages.surface.marching_cubes import (
     AROUND,
@@ -56,6 +57,8 @@ from tourgen.stages.surface.marching_cubes import (
     marching_cubes,
     most_cells,
 )
+from tourgen.stages.surface.meetings import met
+from tourgen.stages.surface.rods import Rod, rods, with_tubes
 from tourgen.stages.surface.samples import distinct_samples, require_range
 from tourgen.stages.surface.tangent_planes import (
     Smoothing,
@@ -64,11 +67,13 @@ from tourgen.stages.surface.tangent_planes import (
     tangent_planes,
 )
 
-VERSION = 5
+VERSION = 6
 _APART = 3.0
 """Spacings between points that stand apart."""
 _HANDFUL = 12
 """Fewer points that stand apart from all others are strays."""
+_TUBE = 2.0
+"""Length of the faces of a rod's tube, in cells."""
 _STEEPEST = 1.8
 """Most change of the distance over the way: 1, and more for the blend and for what was hardly seen.
 At 1.2 edges gape of which one side was (chamber1: 98.97 instead of 99.24 % of what is seen within
@@ -134,8 +139,9 @@ def signed_distance(oriented: OrientedCloud, settings: Settings) -> Mesh:
         InputError: The room has more than two million cells from end to end.
         StageError: There is no surface.
     """
-    planes = supported_planes(oriented, settings)
-    mesh = distances(planes, settings).zero_set(oriented.cloud.origin)
+    found = shapes(oriented, settings)
+    mesh = distances(found.planes, settings).zero_set(oriented.cloud.origin)
+    mesh = found.with_rods(mesh, settings)
     if not len(mesh.faces):
         raise StageError(
             "surface: expected a surface, found none",
@@ -144,8 +150,25 @@ def signed_distance(oriented: OrientedCloud, settings: Settings) -> Mesh:
     return mesh
 
 
-def supported_planes(oriented: OrientedCloud, settings: Settings) -> TangentPlanes:
-    """The planes that their neighbours do not contradict.
+@dataclass(frozen=True, slots=True)
+class Shapes:
+    """What the points say of the surface.
+
+    Attributes:
+        planes: That touch it, those of rods left out.
+        rods: Too thin for planes.
+    """
+
+    planes: TangentPlanes
+    rods: tuple[Rod, ...]
+
+    def with_rods(self, mesh: Mesh, settings: Settings) -> Mesh:
+        """A mesh of the planes, and the rods beside it."""
+        return with_tubes(mesh, self.rods, _TUBE * settings.cell_m)
+
+
+def shapes(oriented: OrientedCloud, settings: Settings) -> Shapes:
+    """The planes that their neighbours do not contradict, flat where many agree, and the rods.
 
     Raises:
         InputError: The room has more than two million cells from end to end.
@@ -158,14 +181,19 @@ def supported_planes(oriented: OrientedCloud, settings: Settings) -> TangentPlan
     noise_m = max(noise_m, settings.spacing_m / 100)
     smoothing = Smoothing(settings.neighbours, settings.crease_deg, noise_m)
     planes = tangent_planes(oriented, smoothing)
-    planes = planes.take(planes.support >= settings.support)
-    planes = planes.take(~_few(planes.points, settings.spacing_m))
+    supported = np.flatnonzero(planes.support >= settings.support)
+    planes = planes.take(supported)
+    many = ~_few(planes.points, settings.spacing_m)
+    planes, raw = planes.take(many), oriented.cloud.points[supported[many]]
     if not len(planes.points):
         raise StageError(
             "surface: expected points that agree on a surface, found none",
             "check the normals, or thin the scan less",
         )
-    return planes
+    planes, flats = flattened(planes, settings.spacing_m)
+    found, theirs = rods(planes, raw, ~flats.broad, settings.spacing_m)
+    flats = replace(flats, of=flats.of[~theirs])
+    return Shapes(met(planes.take(~theirs), flats, settings.spacing_m), found)
 
 
 def _few(points: Float32, spacing_m: float) -> npt.NDArray[np.bool_]:
