@@ -40,7 +40,7 @@ _POINT_OFF = 2.5
 """The same for a tangent plane."""
 _TURNED = 0.5
 """Cosine between a tangent plane's normal and that of the plane that it is moved onto, at least."""
-_LEAST_AREA_M2 = 0.01
+_LEAST_AREA_M2 = 0.004
 _LEAST_SURFELS = 6
 _BENT = 0.45
 """What a paraboloid may explain of a patch, root mean square, in standard deviations."""

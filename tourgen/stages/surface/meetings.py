@@ -38,7 +38,7 @@ _BLUNT = np.cos(np.radians(30.0))
 """Flats that meet at a blunter angle leave no crease."""
 _CELL = 2.0
 """Edge of the cells in which flats are found to be near each other, in spacings."""
-_NEIGHBOURS = 24
+_NEIGHBOURS = 32
 _FIRST = 0.25
 """Where the first sample lies from the line, in spacings."""
 
@@ -57,8 +57,6 @@ def met(planes: TangentPlanes, flats: Flats, spacing_m: float) -> TangentPlanes:
     Returns:
         The planes but those between two flats that meet, and the samples after them.
     """
-    rest = np.flatnonzero(flats.of < 0)
-    mixed = cKDTree(planes.points[rest]) if len(rest) else None
     gone = np.zeros(len(planes.points), bool)
     points = [np.empty((0, 3))]
     of = [np.empty(0, np.int64)]
@@ -70,10 +68,7 @@ def met(planes: TangentPlanes, flats: Flats, spacing_m: float) -> TangentPlanes:
         for number, at in zip((first, second), found.samples, strict=True):
             points.append(line.start + at)
             of.append(np.full(len(at), number))
-        gone[near[found.beyond]] = True
-        if mixed is not None:
-            close = mixed.query_ball_point(found.places + line.start, _MIXED * spacing_m)
-            gone[rest[np.unique(np.concatenate([np.asarray(c, np.int64) for c in close]))]] = True
+        gone[near[found.gone]] = True
     number = np.concatenate(of)
     count = len(number)
     kept = planes.take(~gone)
@@ -87,39 +82,46 @@ def met(planes: TangentPlanes, flats: Flats, spacing_m: float) -> TangentPlanes:
 
 
 def _pairs(points: Float32, flats: Flats, spacing_m: float) -> Iterator[tuple[int, int, Ints]]:
-    """Flats that come near each other at an angle, and the points of both that do."""
-    own = np.flatnonzero(flats.of >= 0)
-    if not len(own):
+    """Flats that come near each other at an angle, and all points near where they do."""
+    if not len(flats.normals):
         return
-    edge_m = _CELL * spacing_m
-    cell = np.floor((points[own] - points[own].min(axis=0)) / edge_m).astype(np.int64)
-    key = np.ravel_multi_index(
-        (*cell.T, flats.of[own]), (*(cell.max(axis=0) + 1), len(flats.normals))
-    )
+    none = len(flats.normals)
+    of = np.where(flats.of < 0, none, flats.of)
+    cell = np.floor((points - points.min(axis=0)) / (_CELL * spacing_m)).astype(np.int64)
+    key = np.ravel_multi_index((*cell.T, of), (*(cell.max(axis=0) + 1), none + 1))
     order = np.argsort(key, kind="stable")
     starts = np.flatnonzero(np.diff(key[order], prepend=-1))
-    number = flats.of[own][order[starts]]
-    count = np.diff(np.append(starts, len(own)))
-    middle = np.add.reduceat(points[own][order], starts) / count[:, None]
+    stops = np.append(starts[1:], len(points))
+    middle = np.add.reduceat(points[order], starts) / (stops - starts)[:, None]
     distance, near = cKDTree(middle).query(
         middle,
-        k=np.arange(2, _NEIGHBOURS + 2),
+        k=np.arange(1, _NEIGHBOURS + 1),
         distance_upper_bound=(_REACH + _CELL) * spacing_m,
         workers=-1,
     )
-    one = np.repeat(np.arange(len(middle)), _NEIGHBOURS)[np.isfinite(distance).ravel()]
-    other = near.ravel()[np.isfinite(distance).ravel()]
+    number = of[order[starts]]
+    there = np.isfinite(distance).ravel()
+    one, other = np.repeat(np.arange(len(middle)), _NEIGHBOURS)[there], near.ravel()[there]
     low, high = np.minimum(number[one], number[other]), np.maximum(number[one], number[other])
+    real = np.flatnonzero((high < none) & (low < high))
+    low, high, one = low[real], high[real], one[real]
     cosine = np.abs(np.einsum("ij,ij->i", flats.normals[low], flats.normals[high]))
     good = (cosine < _BLUNT) & ~(flats.narrow[low] & flats.narrow[high])
-    one, other, pair = one[good], other[good], (low * len(flats.normals) + high)[good]
+    pair, one = (low * none + high)[good], one[good]
     by_pair = np.argsort(pair, kind="stable")
     for chosen in np.split(by_pair, np.flatnonzero(np.diff(pair[by_pair])) + 1):
         if len(chosen):
-            cells = np.unique(np.concatenate([one[chosen], other[chosen]]))
-            members = [order[starts[c] : starts[c] + count[c]] for c in cells]
-            first, second = divmod(int(pair[chosen[0]]), len(flats.normals))
-            yield first, second, own[np.concatenate(members)]
+            around = near[np.unique(one[chosen])]
+            cells = np.unique(around[around < len(middle)])
+            first, second = divmod(int(pair[chosen[0]]), none)
+            yield first, second, order[_ranges(starts[cells], stops[cells])]
+
+
+def _ranges(starts: Ints, stops: Ints) -> Ints:
+    """All numbers of several ranges."""
+    count = stops - starts
+    before = np.cumsum(count) - count
+    return np.arange(count.sum()) + np.repeat(starts - before, count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,13 +158,11 @@ class _Meeting:
 
     Attributes:
         samples: (a, 3) and (b, 3) on either, from the line's start, metres.
-        places: (m, 3) of the line where they meet, the same.
-        beyond: Of the points asked for, positions of those beyond it.
+        gone: Of the points asked for, positions of those that have no place there.
     """
 
     samples: tuple[Float64, Float64]
-    places: Float64
-    beyond: Ints
+    gone: Ints
 
 
 def _meeting(
@@ -171,38 +171,38 @@ def _meeting(
     """Where along a line two flats meet; None where nowhere."""
     apart = (points - line.start) / spacing_m
     along = apart @ line.along
-    place = np.floor(along).astype(np.int64)
-    low = int(place.min())
-    place -= low
+    low = int(np.floor(along.min()))
+    place = np.floor(along).astype(np.int64) - low
     length = int(place.max()) + 1
     aside = [apart @ way for way in line.aside]
-    ends, sides = [], []
-    for number, across in zip(pair, aside, strict=True):
-        mine = (of == number) & (np.abs(across) < _REACH)
-        side, end = _ended(place[mine], across[mine], length)
-        sides.append(side)
-        ends.append(end)
-    front = [side * facing for side, facing in zip(sides, line.facing, strict=True)]
-    both = (front[0] != 0) & (front[0] == front[1])
-    turn = 1 if (both & (front[0] > 0)).sum() * 2 >= both.sum() else -1
+    mine = [(of == number) & (np.abs(a) < _REACH) for number, a in zip(pair, aside, strict=True)]
+    ended = [_ended(place[own], a[own], length) for own, a in zip(mine, aside, strict=True)]
+    front = [side * facing for (side, _), facing in zip(ended, line.facing, strict=True)]
+    off = np.sqrt(np.maximum(np.square(apart).sum(axis=1) - along**2, 0))
+    third = ~np.isin(of, pair)
+    gap = np.maximum(ended[0][1], ended[1][1])
+    others = third & (off > _MIXED) & (off < gap[place] + _MIXED)
+    free = np.bincount(place[others], minlength=length) == 0
+    both = (front[0] != 0) & (front[0] == front[1]) & free
+    turn = 1 if (front[0] * both).sum() >= 0 else -1
     both &= front[0] == turn
     if both.sum() < _LEAST:
         return None
-    wide = np.pad(both, _CLOSED)
-    clear = (sides[0] * line.facing[0] != -turn) & (sides[1] * line.facing[1] != -turn)
-    bridged = binary_closing(wide, np.ones(_CLOSED + 1))[_CLOSED:-_CLOSED] & (clear | both)
+    against = (front[0] == -turn) | (front[1] == -turn) | ~free
+    bridged = binary_closing(np.pad(both, _CLOSED), np.ones(_CLOSED + 1))[_CLOSED:-_CLOSED]
+    bridged &= ~against
     at = np.flatnonzero(bridged)
     where = (at + low + 0.5)[:, None] * line.along
+    rows = np.arange(_FIRST, _REACH)
+    gone = third & (off < _MIXED)
     samples = []
-    beyond = np.zeros(len(points), bool)
     for k, number in enumerate(pair):
         side = turn * line.facing[k]
-        end = np.interp(at, np.flatnonzero(both), ends[k][both])
-        rows = np.arange(_FIRST, _REACH)
+        end = np.interp(at, np.flatnonzero(both), ended[k][1][both])
         wanted, row = np.nonzero(rows < end[:, None] - _FIRST)
         samples.append((where[wanted] + (side * rows[row])[:, None] * line.aside[k]) * spacing_m)
-        beyond |= (of == number) & (aside[k] * side < 0) & bridged[place]
-    return _Meeting((samples[0], samples[1]), where * spacing_m, np.flatnonzero(beyond))
+        gone |= (of == number) & (aside[k] * side < 0)
+    return _Meeting((samples[0], samples[1]), np.flatnonzero(gone & bridged[place]))
 
 
 def _ended(place: Ints, across: Float64, length: int) -> tuple[Float64, Float64]:
