@@ -58,6 +58,7 @@ from tourgen.stages.surface.marching_cubes import (
     most_cells,
 )
 from tourgen.stages.surface.meetings import met
+from tourgen.stages.surface.profiles import along_profiles
 from tourgen.stages.surface.rods import Rod, rods, with_tubes
 from tourgen.stages.surface.samples import distinct_samples, require_range
 from tourgen.stages.surface.tangent_planes import (
@@ -67,7 +68,7 @@ from tourgen.stages.surface.tangent_planes import (
     tangent_planes,
 )
 
-VERSION = 6
+VERSION = 7
 _APART = 3.0
 """Spacings between points that stand apart."""
 _HANDFUL = 12
@@ -190,6 +191,8 @@ def shapes(oriented: OrientedCloud, settings: Settings) -> Shapes:
             "surface: expected points that agree on a surface, found none",
             "check the normals, or thin the scan less",
         )
+    _, flats = flattened(planes, settings.spacing_m)
+    planes = along_profiles(planes, raw, ~flats.broad, smoothing)
     planes, flats = flattened(planes, settings.spacing_m)
     found, theirs = rods(planes, raw, ~flats.broad, settings.spacing_m)
     flats = replace(flats, of=flats.of[~theirs])

@@ -1,0 +1,128 @@
+"""Profiles: mouldings, beams and the edges of boards are read along their length.
+
+A moulding's facets are 20 mm wide, points 12 mm apart: no neighbourhood is small enough to lie on
+one facet and large enough to tell its plane from the noise. But a profile is the same all along,
+for metres. So where the surface runs on in one direction, space is compressed in that direction and
+tangent planes are fitted there: neighbours then come from an ellipsoid that is long and thin, and a
+section of the profile has several times the points across. The fit itself is the same one
+(``stages.tangent``, robust to creases, then ``tangent_planes``); where more of the neighbours agree
+with it than with the one in plain space, it holds.
+
+The directions are those in which many neighbourhoods' normals do not turn: the axis of a
+generalised cylinder is the direction across which its normals spread.
+
+On the demo's first chamber (455 m of creases, most of them between facets of 15 to 60 mm) 52 % of
+the creases lay within 4 mm before and 60 % after. Compressed sixteenfold instead of eightfold: the
+same. Tried on all points, however the normals spread: 61 %, in two and a half times the time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from tourgen.geometry import Float32, OrientedCloud, PointCloud
+from tourgen.stages import tangent
+from tourgen.stages.surface.tangent_planes import Smoothing, TangentPlanes, tangent_planes
+
+_COMPRESSED = np.float32(8.0)
+_NEIGHBOURS = 32
+"""Points whose normals tell the direction in which the surface runs on."""
+_STEADY, _BENT = 0.06, 0.02
+"""Mean square of the normals along that direction, at most, and across, at least."""
+_PEAK = np.cos(np.radians(3.0))
+_APART = np.cos(np.radians(6.0))
+_DIRECTIONS = 12
+_LEAST_SHARE = 0.005
+"""Part of the sampled points that run on in a direction that is tried."""
+_SAMPLE = 20_000
+_ALONG = np.cos(np.radians(15.0))
+"""How far off a direction a point's own may be for it to be tried."""
+_FIRST, _WIDE = 12, 32
+"""Neighbours of the robust fit; see ``tangent.tangent_planes``."""
+_LEAST = 64
+_FLATTEST = 0.8
+"""Length across the direction of a normal that the fit finds, at least."""
+
+Ints = npt.NDArray[np.int64]
+
+
+def along_profiles(
+    planes: TangentPlanes, raw: Float32, rest: npt.NDArray[np.bool_], smoothing: Smoothing
+) -> TangentPlanes:
+    """Fit tangent planes anew where the surface runs on in one direction.
+
+    Args:
+        planes: n tangent planes.
+        raw: (n, 3) the points that they were fitted to, metres.
+        rest: (n,) mask of those to be looked at: what lies on a broad flat needs no better plane.
+        smoothing: As they were fitted.
+
+    Returns:
+        n tangent planes.
+    """
+    at = np.flatnonzero(rest)
+    if len(at) < _LEAST:
+        return planes
+    own, runs_on = _directions(planes.points[at], planes.normals[at])
+    points, normals = planes.points.copy(), planes.normals.copy()
+    best = planes.support.copy()
+    for way in _peaks(own[runs_on]):
+        tried = at[runs_on & (np.abs(own @ way) > _ALONG)]
+        if len(tried) < _LEAST:
+            continue
+        fitted = _fitted(raw[tried], planes.normals[tried], way, smoothing)
+        better = fitted.support > best[tried]
+        won = tried[better]
+        points[won], normals[won] = fitted.points[better], fitted.normals[better]
+        best[won] = fitted.support[better]
+    return replace(planes, points=points, normals=normals, support=best)
+
+
+def _directions(points: Float32, normals: Float32) -> tuple[Float32, npt.NDArray[np.bool_]]:
+    """(n, 3) direction in which the surface runs on around each point; (n,) whether it does."""
+    count = min(_NEIGHBOURS, len(points))
+    near = np.asarray(cKDTree(points).query(points, k=np.arange(1, count + 1), workers=-1)[1])
+    spread = np.zeros((len(points), 3, 3), np.float32)
+    for column in near.T:
+        theirs = normals[column]
+        spread += theirs[:, :, None] * theirs[:, None, :]
+    square, axes = np.linalg.eigh(spread / count)
+    return axes[:, :, 0], (square[:, 0] < _STEADY) & (square[:, 1] > _BENT)
+
+
+def _peaks(directions: Float32) -> list[Float32]:
+    """(3,) each, the directions that most share, most first."""
+    chosen = np.random.default_rng(0).permutation(len(directions))[:_SAMPLE]
+    left = directions[chosen]
+    least = max(_LEAST_SHARE * len(left), 1)
+    found: list[Float32] = []
+    while len(left) and len(found) < _DIRECTIONS:
+        some = left[:: max(1, len(left) // 1000)]
+        fits = np.abs(some @ left.T) > _PEAK
+        peak = some[fits.sum(axis=1).argmax()]
+        mine = np.abs(left @ peak) > _PEAK
+        if mine.sum() < least:
+            break
+        found.append(np.linalg.eigh(left[mine].T @ left[mine])[1][:, 2])
+        left = left[np.abs(left @ found[-1]) < _APART]
+    return found
+
+
+def _fitted(points: Float32, normals: Float32, way: Float32, smoothing: Smoothing) -> TangentPlanes:
+    """Tangent planes along a direction, from points in a space that is compressed in it."""
+    lost = ((1 - 1 / _COMPRESSED) * (points @ way))[:, None] * way
+    thin = points - lost
+    found = tangent.tangent_planes(thin, _FIRST, _WIDE)
+    found = found - (found @ way)[:, None] * way
+    length = np.linalg.norm(found, axis=1, keepdims=True)
+    found /= np.maximum(length, 1e-6)
+    found *= np.sign(np.einsum("ij,ij->i", found, normals))[:, None]
+    found = np.where(length > _FLATTEST, found, normals)
+    nobody, black = np.full(len(thin), -1, np.int16), np.zeros((len(thin), 3), np.uint8)
+    cloud = PointCloud(np.zeros(3), thin, black, nobody)
+    fitted = tangent_planes(OrientedCloud(cloud, found, np.empty((0, 3))), smoothing)
+    return replace(fitted, points=fitted.points + lost)
