@@ -1,12 +1,13 @@
 """Signed distance: how far in front of the nearest tangent plane a place lies (Hoppe et al. 1992).
 
-The planes come from ``tangent_planes``. Between them the distances to the nearest few are blended,
-with weights that end at the last of these, so that the blend has no steps (Shen, O'Brien and
-Shewchuk 2004; Kolluri 2005). Where the few look two ways they are the two sides of a crease, each
-with a distance of its own: at an edge the larger counts, in a corner the smaller (Fleishman,
-Cohen-Or and Silva 2005). The distance is unknown where the foot of a place on its nearest plane
-lies farther from that plane's point than the sampling density and the noise together: there the
-surface ends, and windows stay open.
+The planes come from ``tangent_planes``; the shapes that many of them agree on tell them better
+(``profiles``, ``flats``, ``meetings``), and rails stand beside the surface as tubes (``rods``).
+Between planes the distances to the nearest few are blended, with weights that end at the last of
+these, so that the blend has no steps (Shen, O'Brien and Shewchuk 2004; Kolluri 2005). Where the few
+look two ways they are the two sides of a crease, each with a distance of its own: at an edge the
+larger counts, in a corner the smaller (Fleishman, Cohen-Or and Silva 2005). The distance is unknown
+where the foot of a place on its nearest plane lies farther from that plane's point than the sampling
+density and the noise together: there the surface ends, and windows stay open.
 
 Distances are taken only at the corners of cells that the surface enters (``growing``).
 
