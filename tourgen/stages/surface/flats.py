@@ -89,7 +89,7 @@ class Flats:
     @property
     def broad(self) -> Mask:
         """(n,) which tangent planes lie on a flat that is no mere strip."""
-        return (self.of >= 0) & ~np.append(self.narrow, True)[self.of]
+        return np.asarray((self.of >= 0) & ~np.append(self.narrow, True)[self.of])
 
 
 def flattened(planes: TangentPlanes, spacing_m: float) -> tuple[TangentPlanes, Flats]:

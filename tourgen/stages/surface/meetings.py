@@ -69,12 +69,12 @@ def met(planes: TangentPlanes, flats: Flats, spacing_m: float) -> TangentPlanes:
             points.append(line.start + at)
             of.append(np.full(len(at), number))
         gone[near[found.gone]] = True
-    number = np.concatenate(of)
-    count = len(number)
+    on = np.concatenate(of)
+    count = len(on)
     kept = planes.take(~gone)
     return TangentPlanes(
         np.concatenate([kept.points, np.concatenate(points).astype(np.float32)]),
-        np.concatenate([kept.normals, flats.normals[number].astype(np.float32)]),
+        np.concatenate([kept.normals, flats.normals[on].astype(np.float32)]),
         np.concatenate([kept.spacing_m, np.full(count, spacing_m, np.float32)]),
         np.concatenate([kept.support, np.ones(count, np.float32)]),
         planes.noise_m,
@@ -93,12 +93,13 @@ def _pairs(points: Float32, flats: Flats, spacing_m: float) -> Iterator[tuple[in
     starts = np.flatnonzero(np.diff(key[order], prepend=-1))
     stops = np.append(starts[1:], len(points))
     middle = np.add.reduceat(points[order], starts) / (stops - starts)[:, None]
-    distance, near = cKDTree(middle).query(
+    distance, found = cKDTree(middle).query(
         middle,
         k=np.arange(1, _NEIGHBOURS + 1),
         distance_upper_bound=(_REACH + _CELL) * spacing_m,
         workers=-1,
     )
+    near = np.asarray(found)
     number = of[order[starts]]
     there = np.isfinite(distance).ravel()
     one, other = np.repeat(np.arange(len(middle)), _NEIGHBOURS)[there], near.ravel()[there]
@@ -121,7 +122,7 @@ def _ranges(starts: Ints, stops: Ints) -> Ints:
     """All numbers of several ranges."""
     count = stops - starts
     before = np.cumsum(count) - count
-    return np.arange(count.sum()) + np.repeat(starts - before, count)
+    return np.asarray(np.arange(count.sum()) + np.repeat(starts - before, count))
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,14 +184,9 @@ def _meeting(
     gap = np.maximum(ended[0][1], ended[1][1])
     others = third & (off > _MIXED) & (off < gap[place] + _MIXED)
     free = np.bincount(place[others], minlength=length) == 0
-    both = (front[0] != 0) & (front[0] == front[1]) & free
-    turn = 1 if (front[0] * both).sum() >= 0 else -1
-    both &= front[0] == turn
+    turn, both, bridged = _turned(front[0], front[1], free)
     if both.sum() < _LEAST:
         return None
-    against = (front[0] == -turn) | (front[1] == -turn) | ~free
-    bridged = binary_closing(np.pad(both, _CLOSED), np.ones(_CLOSED + 1))[_CLOSED:-_CLOSED]
-    bridged &= ~against
     at = np.flatnonzero(bridged)
     where = (at + low + 0.5)[:, None] * line.along
     rows = np.arange(_FIRST, _REACH)
@@ -203,6 +199,23 @@ def _meeting(
         samples.append((where[wanted] + (side * rows[row])[:, None] * line.aside[k]) * spacing_m)
         gone |= (of == number) & (aside[k] * side < 0)
     return _Meeting((samples[0], samples[1]), np.flatnonzero(gone & bridged[place]))
+
+
+def _turned(first: Float64, second: Float64, free: Mask) -> tuple[int, Mask, Mask]:
+    """Whether two flats meet in a corner, 1, or at an edge, -1; where; and with what is bridged.
+
+    Args:
+        first: (m,) whether one flat ends before, 1, or behind the other, -1, at each place; 0: it
+            does not end there.
+        second: (m,) the same of the other flat.
+        free: (m,) whether nothing stands between them.
+    """
+    both = (first != 0) & (first == second) & free
+    turn = 1 if (first * both).sum() >= 0 else -1
+    both &= first == turn
+    wide = binary_closing(np.pad(both, _CLOSED), np.ones(_CLOSED + 1, np.bool_))
+    against = (first == -turn) | (second == -turn) | ~free
+    return turn, both, np.asarray(wide[_CLOSED:-_CLOSED] & ~against)
 
 
 def _ended(place: Ints, across: Float64, length: int) -> tuple[Float64, Float64]:

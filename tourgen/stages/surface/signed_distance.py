@@ -6,8 +6,8 @@ Between planes the distances to the nearest few are blended, with weights that e
 these, so that the blend has no steps (Shen, O'Brien and Shewchuk 2004; Kolluri 2005). Where the few
 look two ways they are the two sides of a crease, each with a distance of its own: at an edge the
 larger counts, in a corner the smaller (Fleishman, Cohen-Or and Silva 2005). The distance is unknown
-where the foot of a place on its nearest plane lies farther from that plane's point than the sampling
-density and the noise together: there the surface ends, and windows stay open.
+where the foot of a place on its nearest plane lies farther from that plane's point than the
+sampling density and the noise together: there the surface ends, and windows stay open.
 
 Distances are taken only at the corners of cells that the surface enters (``growing``).
 
