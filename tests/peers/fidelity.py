@@ -23,6 +23,7 @@ import report
 from browsing import photographed, published
 from contestants import CHAINS, PUBLISHED, Contestant
 from drawing import draw
+from gaps import Gaps
 from ledger import Ledger, digest
 from picture_score import fitted_gain, score_pictures
 from planes import Creases, Flatness, Rails, model_rods
@@ -74,6 +75,11 @@ class Bench:
         return Creases(self.reference.truth)
 
     @cached_property
+    def gaps(self) -> Gaps:
+        """Where nobody measured, and where nothing is."""
+        return Gaps.of(self.room, self.reference.truth)
+
+    @cached_property
     def rails(self) -> Rails:
         """Its rods."""
         truth = self.reference.truth
@@ -97,7 +103,14 @@ class Bench:
                 **self.rails.figures(vertices, faces),
             }
 
-        return self.ledger.figures(f"surface-{digest(one.files)}", measure)
+        def gaps() -> Figures:
+            return self.gaps.figures(*one.mesh)
+
+        name = digest(one.files)
+        return {
+            **self.ledger.figures(f"surface-{name}", measure),
+            **self.ledger.figures(f"gaps-{name}", gaps),
+        }
 
     def pictures(self, one: Contestant, budget: int) -> list[UInt8]:
         """What the room's cameras see of a contestant, and the plaque's after them.
