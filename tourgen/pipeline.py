@@ -237,7 +237,9 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         picture.guessed,
         unwrapped,
         cleaned,
+        joined,
         spaced,
+        settings=surface.Detail(detail_mm),
         version=inferred.VERSION,
         libraries=("scipy",),
     )
@@ -275,7 +277,9 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         surface.measured,
         simplified,
         cleaned,
+        joined,
         spaced,
+        settings=surface.Detail(detail_mm),
         version=measure.VERSION,
         libraries=("open3d", "scipy"),
     )

@@ -6,7 +6,7 @@ not, and stations and owners are found), and the points left are held against th
 ``tourgen.simulate`` wrote. ``gallery`` is a structured E57 by another simulator, with the true
 mesh but without labels; they follow from the mesh: what lies over 0.1 m outside it is a stray,
 what else lies over 10 mm and five times the range noise off is mixed. Merged, it is the same
-points, shuffled, with the stations' places given and the points' owners forgotten.
+points, shuffled; the stations' places and the points' owners are forgotten, to be found.
 
 share gone         Of each label. Mixed pixels count where they lie over 10 mm off the true surface.
 lost, of its area  Of the true area that a station sees and that had a point within 10 mm: what
@@ -103,6 +103,7 @@ def gallery(folder: Path, suffix: str) -> Case:
         order = np.random.default_rng(2).permutation(len(cloud))
         cloud, label, off_m = cloud.take(order), label[order], off_m[order]
         cloud = replace(cloud, station=np.full_like(cloud.station, -1))
+        known = np.empty((0, 3))
     return Case(f"gallery.{suffix}", cloud, known, label.astype(np.uint8), off_m, wanted)
 
 

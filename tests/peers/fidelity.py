@@ -23,6 +23,7 @@ import report
 from browsing import photographed, published
 from contestants import CHAINS, PUBLISHED, Contestant
 from drawing import draw
+from gaps import Gaps
 from ledger import Ledger, digest
 from picture_score import fitted_gain, score_pictures
 from planes import Creases, Flatness, Rails, model_rods
@@ -37,7 +38,7 @@ import tourgen
 from tourgen.geometry import UInt8
 from tourgen.simulation.light import ray_scene
 
-VERSION = 1
+VERSION = 2
 """Raised when a measure changes, so that nothing is taken from earlier runs."""
 
 
@@ -74,6 +75,11 @@ class Bench:
         return Creases(self.reference.truth)
 
     @cached_property
+    def gaps(self) -> Gaps:
+        """Where nobody measured, and where nothing is."""
+        return Gaps.of(self.room, self.reference.truth)
+
+    @cached_property
     def rails(self) -> Rails:
         """Its rods."""
         truth = self.reference.truth
@@ -97,7 +103,14 @@ class Bench:
                 **self.rails.figures(vertices, faces),
             }
 
-        return self.ledger.figures(f"surface-{digest(one.files)}", measure)
+        def gaps() -> Figures:
+            return self.gaps.figures(*one.mesh)
+
+        name = digest(one.files)
+        return {
+            **self.ledger.figures(f"surface-{name}", measure),
+            **self.ledger.figures(f"gaps-{name}", gaps),
+        }
 
     def pictures(self, one: Contestant, budget: int) -> list[UInt8]:
         """What the room's cameras see of a contestant, and the plaque's after them.
@@ -134,7 +147,9 @@ class Bench:
                 "psnr_db": float(np.mean(scored.psnr_db)),
                 "psnr_worst_db": min(scored.psnr_db),
                 "ssim": float(np.mean(scored.ssim)),
-                **seam_figures(truth, truth.cameras, views, shots, fitted_gain(views, shots)),
+                **seam_figures(
+                    truth, truth.cameras, views, shots, fitted_gain(views, shots), one.mesh
+                ),
             }
             if self.room.id in EDGES_MM:
                 camera, boards = plaque_view(self.room.id)

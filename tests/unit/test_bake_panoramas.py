@@ -147,6 +147,18 @@ def test_where_there_is_no_picture_the_points_tell() -> None:
     assert np.abs(colors[below] - painted(places[below])).max() < 14
 
 
+def test_white_specks_are_no_lamps_but_a_lamp_has_glare() -> None:
+    plain = photo(LENSES[0], painted)
+    specked, lit = plain.image.copy(), plain.image.copy()
+    specked[300:500:20, ::16] = 255
+    specked[301:501:20, ::16] = 255
+    lit[400:408, 200:208] = 255
+    _, shown = ready([plain, replace(plain, image=specked), replace(plain, image=lit)])
+    assert np.array_equal(shown[1].trust, shown[0].trust)
+    assert shown[2].trust[400:408, 200:208].max() < 0.05
+    assert shown[2].trust[400, 600] == shown[0].trust[400, 600] == 1
+
+
 def test_a_picture_of_something_else_is_left_out() -> None:
     turned = photo(LENSES[0], painted)
     turned = replace(turned, rotation=np.diag([-1.0, -1.0, 1.0]))
@@ -166,7 +178,7 @@ def test_points_without_colour_leave_it_to_the_pictures() -> None:
 
 def test_agreement_drops_the_one_that_differs() -> None:
     shown = np.array([[[100.0] * 3], [[104.0] * 3], [[240.0] * 3]], np.float32)
-    trust = agreement(shown, np.ones((3, 1), np.float32))[:, 0]
+    trust = agreement(shown, np.ones((3, 1), np.float32), 20.0)[:, 0]
     assert trust[:2].min() > 0.99
     assert trust[2] < 0.01
 

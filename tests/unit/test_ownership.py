@@ -56,9 +56,11 @@ def test_one_station_missing_nobody_owns(merged):
     assert np.linalg.norm(found.stations - PLACES[:1]) < 0.0001
 
 
-def test_a_place_where_nobody_stood_owns_nothing(merged):
+@pytest.mark.parametrize("place", [[[0.4, -1.3, 0.9]], [[-0.75, -1.72, 0.67]]], ids=str)
+def test_a_place_where_nobody_stood_owns_nothing(merged, place):
+    """From the second the steps of a grid grow without end, until all points lie on it."""
     points, _ = merged
-    place = np.array([[0.4, -1.3, 0.9]])
+    place = np.array(place)
     found = ownership(points, place, Settings())
     assert (found.station == -1).all()
     assert (found.stations == place).all()

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tourgen.fitting.lengths import Corner, support_m
+from tourgen.fitting.lengths import Corner, detail_m
 from tourgen.fitting.points import RoomScan, moved
-from tourgen.fitting.surface import Drawn
+from tourgen.fitting.surface import Detail, Drawn
 from tourgen.geometry import (
     Float32,
     Float64,
@@ -160,11 +160,16 @@ def baked(
 
 
 def guessed(
-    unwrapped_tiles: tuple[UvMesh, ...], cloud: PointCloud, spacing: Spacing
+    unwrapped_tiles: tuple[UvMesh, ...],
+    cloud: PointCloud,
+    joined: register.Registered,
+    spacing: Spacing,
+    asked: Detail,
 ) -> tuple[UInt8, ...]:
     """Which vertices of each tile no measurement stands behind."""
     vertices = tuple(each.mesh.vertices for each in unwrapped_tiles)
-    return inferred.inferred(vertices, cloud, inferred.Settings(support_m(spacing)))
+    settings = inferred.Settings(detail_m(spacing, asked.detail_mm))
+    return inferred.inferred(vertices, cloud, joined.stations, settings)
 
 
 def packed(

@@ -12,7 +12,7 @@ from tourgen.errors import InputError
 from tourgen.fitting.lengths import Corner, corners, detail_m, support_m
 from tourgen.geometry import Float64, Mesh, OrientedCloud, PointCloud
 from tourgen.scans import Frame, read_mesh
-from tourgen.stages import levels, measure, trim
+from tourgen.stages import inferred, levels, measure, register, trim
 from tourgen.stages.mesh_arrays import vertex_normals
 from tourgen.stages.spacing import Spacing
 from tourgen.stages.surface import auto, ball_pivoting, crust, poisson, signed_distance
@@ -212,6 +212,13 @@ def levelled(mesh: Mesh, spacing: Spacing, asked: Detail) -> levels.Levels:
     return levels.levels(mesh, levels.Settings(detail_m(spacing, asked.detail_mm)))
 
 
-def measured(simplified: levels.Levels, cloud: PointCloud, spacing: Spacing) -> measure.Quality:
+def measured(
+    simplified: levels.Levels,
+    cloud: PointCloud,
+    joined: register.Registered,
+    spacing: Spacing,
+    asked: Detail,
+) -> measure.Quality:
     """Compare the finest mesh with the scan."""
-    return measure.measure(simplified.finest, cloud, measure.Settings(support_m(spacing)))
+    settings = inferred.Settings(detail_m(spacing, asked.detail_mm))
+    return measure.measure(simplified.finest, cloud, joined.stations, settings)

@@ -5,24 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from tourgen.geometry import Mesh, PointCloud
+from tourgen.geometry import Float64, Mesh, PointCloud
+from tourgen.stages import inferred
 from tourgen.stages.mesh_arrays import face_areas
 
-VERSION = 1
+VERSION = 1 + inferred.VERSION
 _SAMPLE = 200_000
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """What counts as inferred.
-
-    Attributes:
-        support_m: A face farther than this from every point is inferred.
-    """
-
-    support_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +21,7 @@ class Quality:
     Attributes:
         cloud_to_mesh_p50_mm: Median distance from a point to the surface.
         cloud_to_mesh_p95_mm: Its 95th percentile.
-        inferred_area_ratio: Share of the surface's area farther than ``support_m`` from a point.
+        inferred_area_ratio: Share of the surface's area that no point was measured at.
         area_m2: Area of the surface.
     """
 
@@ -42,8 +31,17 @@ class Quality:
     area_m2: float
 
 
-def measure(mesh: Mesh, cloud: PointCloud, settings: Settings) -> Quality:
-    """Compare the finest mesh with the cleaned points."""
+def measure(
+    mesh: Mesh, cloud: PointCloud, stations: Float64, settings: inferred.Settings
+) -> Quality:
+    """Compare the finest mesh with the cleaned points.
+
+    Args:
+        mesh: The finest; its faces are judged by their middles.
+        cloud: The cleaned points, unthinned.
+        stations: (s, 3) metres from the cloud's origin, that its ``station`` counts through.
+        settings: What counts as inferred, as in the tiles.
+    """
     import open3d as o3d
 
     scene = o3d.t.geometry.RaycastingScene()
@@ -52,6 +50,7 @@ def measure(mesh: Mesh, cloud: PointCloud, settings: Settings) -> Quality:
     distance = scene.compute_distance(np.ascontiguousarray(cloud.points[::step])).numpy()
     p50, p95 = 1000 * np.quantile(distance, [0.5, 0.95])
     area = face_areas(mesh)
-    gap, _ = cKDTree(cloud.points).query(mesh.vertices[mesh.faces].mean(axis=1), workers=-1)
-    inferred = area[gap > settings.support_m].sum() / area.sum()
-    return Quality(round(float(p50), 3), round(float(p95), 3), float(inferred), float(area.sum()))
+    middles = mesh.vertices[mesh.faces].mean(axis=1)
+    guess = ~inferred.measured(middles, cloud, stations, settings)
+    share = area[guess].sum() / area.sum()
+    return Quality(round(float(p50), 3), round(float(p95), 3), float(share), float(area.sum()))

@@ -31,7 +31,7 @@ from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64
 
-VERSION = 2
+VERSION = 3
 _TURN = 2j * np.pi
 _HIGHEST_DEG = 75.0
 """Windows nearer the zenith hold all azimuths."""
@@ -118,6 +118,12 @@ class _Grid:
         elevation, azimuth = self.phases(points)
         off = np.hypot(elevation - np.rint(elevation), azimuth - np.rint(azimuth))
         return off.astype(np.float32)
+
+    def is_as_fine_as(self, step_deg: tuple[float, float]) -> bool:
+        """Whether its steps lie within these: one whose steps grow without end fits all points."""
+        finest, coarsest = step_deg
+        steps = np.array([self.elevation[0], self.azimuth[0]])
+        return bool(np.all((steps >= 1 / coarsest) & (steps <= 1 / finest)))
 
     def moved(self, x: Float64) -> _Grid:
         """A grid near by: x in steps as large as its parameters are uncertain."""
@@ -222,8 +228,13 @@ def _grid(
         return None
     sample = points[rng.permutation(len(points))[: settings.polish_points]]
     sample = sample[np.abs(_angles(sample, place)[0]) < _HIGHEST_DEG]
-    grids = [_polished(grid, sample, settings) for grid, _ in fits]
-    return max(grids, key=lambda grid: int((grid.off(sample) < settings.most_off / 4).sum()))
+    polished = (_polished(grid, sample, settings) for grid, _ in fits)
+    grids = [grid for grid in polished if grid.is_as_fine_as(settings.step_deg)]
+    return max(
+        grids,
+        key=lambda grid: int((grid.off(sample) < settings.most_off / 4).sum()),
+        default=None,
+    )
 
 
 # ------------------------------------------------------------------ windows

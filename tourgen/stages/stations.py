@@ -3,11 +3,13 @@
 No scanner looks straight down. Around each tripod the floor is bare, or holds only what other
 stations saw, and right outside that disc it is denser than anywhere else. So the discs are rings
 in a density map of the floor: the strongest answers of a ring-shaped filter, dense outside and
-sparse inside, over the radii that tripods make.
+sparse inside, over the radii that tripods make. Each level is looked at for itself: a tripod that
+looks down on a dais leaves its disc there and none in the floor.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +17,13 @@ from scipy.ndimage import gaussian_filter
 
 from tourgen.geometry import Float32, Float64
 
-VERSION = 3
+VERSION = 4
 _SECTORS = 8
+_BIN_M = 0.02
+_LEVEL_SHARE = 0.2
+"""Of the points of the fullest height; the floor of the demo's rooms holds 0.4 of the ceiling's."""
+_ABOVE_SHARE = 0.1
+"""Of all points: a ceiling has next to none above it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +60,60 @@ def find_stations(points: Float32, settings: Settings) -> Float64:
     Returns:
         (s, 3) metres, strongest evidence first; s is 0 where no disc stands out.
     """
-    floor_z = _floor_z(points)
-    on_floor = points[np.abs(points[:, 2] - floor_z) < 0.03, :2].astype(np.float64)
-    if len(on_floor) < 1000:
-        return np.empty((0, 3))
-    low = on_floor.min(axis=0)
-    cell = np.floor((on_floor - low) / settings.cell_m).astype(int)
+    discs = [disc for level_z in _levels_z(points) for disc in _discs(points, level_z, settings)]
+    found: list[Float64] = []
+    for disc in sorted(discs, key=lambda disc: -disc.contrast):
+        apart_m = [float(np.linalg.norm(disc.station - other)) for other in found]
+        if min(apart_m, default=np.inf) > disc.radius_m and _is_clear(points, disc, settings):
+            found.append(disc.station)
+    return np.array(found[: settings.most]).reshape(-1, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class _Disc:
+    """A blind disc.
+
+    Attributes:
+        station: (3,) metres, where the scanner stood above it.
+        radius_m: Of the disc.
+        contrast: Step of log density at its edge.
+    """
+
+    station: Float64
+    radius_m: float
+    contrast: float
+
+
+def _levels_z(points: Float32) -> list[float]:
+    """Heights of the levels that hold a good share of the points: the lowest, and all above it that
+    are no ceiling.
+
+    A tripod may stand on a dais or a landing, or over a table's edge: its disc then lies there, and
+    the floor that most points lie on has none.
+    """
+    bins = np.arange(points[:, 2].min(), points[:, 2].max() + 2 * _BIN_M, _BIN_M)
+    count, edges = np.histogram(points[:, 2], bins)
+    around = np.pad(count, 1)
+    peak = (count >= around[:-2]) & (count > around[2:]) & (count > _LEVEL_SHARE * count.max())
+    above = 1 - np.cumsum(count) / len(points)
+    peak &= (above > _ABOVE_SHARE) | (np.cumsum(peak) == 1)
+    middles = edges[:-1][peak] + _BIN_M / 2
+    return [float(np.median(_slab(points, z, 2 * _BIN_M)[:, 2])) for z in middles]
+
+
+def _slab(points: Float32, height: float, half_m: float) -> Float32:
+    """The points that near to a height."""
+    near: Float32 = points[np.abs(points[:, 2] - height) < half_m]
+    return near
+
+
+def _discs(points: Float32, level_z: float, settings: Settings) -> Iterator[_Disc]:
+    """Blind discs in one level, the clearest first."""
+    level = _slab(points, level_z, 0.03)[:, :2].astype(np.float64)
+    if len(level) < 1000:
+        return
+    low = level.min(axis=0)
+    cell = np.floor((level - low) / settings.cell_m).astype(int)
     shape = cell.max(axis=0) + 1
     count = np.bincount(cell[:, 0] * shape[1] + cell[:, 1], minlength=shape.prod())
     density = np.log1p(gaussian_filter(count.reshape(shape).astype(float), 1.0))
@@ -66,30 +121,23 @@ def find_stations(points: Float32, settings: Settings) -> Float64:
     score = np.stack([_ring_response(density, radius / settings.cell_m) for radius in radii])
     # A table's leg answers the smallest radii, a wall the largest ones.
     score -= np.maximum(np.maximum(score[0], score[-1]), 0)
-    found = []
+    x, y = np.ogrid[: shape[0], : shape[1]]
     for _ in range(settings.most):
         best = np.unravel_index(np.argmax(score), score.shape)
         if score[best] < settings.contrast:
-            break
-        radius = radii[best[0]]
+            return
+        radius = float(radii[best[0]])
         centre = low + (np.array(best[1:]) + 0.5) * settings.cell_m
         height = radius / np.tan(np.radians(settings.blind_angle_deg))
-        place = np.array([*centre, floor_z + height])
-        if np.square(points - place.astype(np.float32)).sum(axis=1).min() > settings.clearance_m**2:
-            found.append(place)
-        x, y = np.ogrid[: shape[0], : shape[1]]
+        yield _Disc(np.array([*centre, level_z + height]), radius, float(score[best]))
         near = np.hypot(x - best[1], y - best[2]) < 0.7 * radius / settings.cell_m
         score[:, near] = -np.inf
-    return np.array(found).reshape(-1, 3)
 
 
-def _floor_z(points: Float32) -> float:
-    """Height of the lowest level that holds a good share of the points."""
-    bins = np.arange(points[:, 2].min(), points[:, 2].max() + 0.04, 0.02)
-    count, edges = np.histogram(points[:, 2], bins)
-    level = np.flatnonzero(count > 0.3 * count.max())[0]
-    near = np.abs(points[:, 2] - edges[level] - 0.01) < 0.04
-    return float(np.median(points[near, 2]))
+def _is_clear(points: Float32, disc: _Disc, settings: Settings) -> bool:
+    """Whether nothing stands where the scanner did."""
+    away2 = np.square(points - disc.station.astype(np.float32)).sum(axis=1)
+    return bool(away2.min() > settings.clearance_m**2)
 
 
 def _ring_response(density: Float64, radius: float) -> Float64:

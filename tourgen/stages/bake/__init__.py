@@ -34,7 +34,7 @@ __all__ = [
     "vistas",
 ]
 
-VERSION = 5
+VERSION = 6
 
 
 def bake(

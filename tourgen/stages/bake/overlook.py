@@ -2,9 +2,15 @@
 
 Each picture gets the range of the surface in its directions (a depth buffer, Williams: Casting
 curved shadows on curved surfaces, 1978), a trust that fades toward what should not be used (no
-picture, burnt-out lamps and their glare, edges in depth, where a millimetre of pose decides what a
-pixel shows), a gain that brings it into agreement with the others and with the points, and a
-pyramid of smaller copies for coarse texels.
+picture, burnt-out lamps and their glare, the pixels at edges in depth, where a millimetre of pose
+decides what they show), a gain that brings it into agreement with the others and with the points,
+and a pyramid of smaller copies for coarse texels.
+
+PSNR over 20,000 pixels of ten views of the demo's first chamber, kernels evaluated without texels
+between: trust that grows from 2 to 8 pixels of the depth buffer about edges 24.72 dB, from 0 to 1
+25.37; with poses off by 5 mm and 0.1 degrees 24.08 and 24.55, by 10 mm and 0.3 degrees 22.78 and
+22.98. No distrust of edges gains 0.03 to 0.06 in all three, all of it where the surface stands
+wrong. White specks taken for lamps 25.28.
 
 A picture that shows other tones than the points see at the same places (correlation below a half)
 has a wrong pose or another room's picture, and is left out.
@@ -26,7 +32,7 @@ Bool = npt.NDArray[np.bool_]
 
 _WIDEST_DEPTH = 2048
 _JUMP = 0.01  # second difference of 1 / range, relative, per pixel
-_EDGE_PX = (2.0, 8.0)  # of the depth buffer: no trust at an edge, all of it from there on
+_EDGE_PX = (0.0, 1.0)  # of the depth buffer: no trust at an edge, all of it from there on
 _BLACK = 10  # JPEG's ripples about an area without picture
 _BLACK_PX = 9  # smallest width of such an area
 _FADE_PX = 12.0
@@ -34,6 +40,7 @@ _SAMPLES = 40_000
 _SAMPLE_M = 0.04  # means of so much are compared: single pixels differ by JPEG's and by noise
 _LEAST_SAMPLES = 200
 _GLARE_PX = 8
+_LAMP_PX = 3  # of the depth buffer: smaller specks are paint, made brighter by JPEG's ripples
 _SURE = 0.9
 
 
@@ -153,10 +160,11 @@ def _resized(values: Float32, size: tuple[int, int]) -> Float32:
 
 def _glare_trust(panorama: Panorama, size: tuple[int, int], settings: VistaSettings) -> Float32:
     """Low about burnt-out directions; on a coarse grid, as glare has no edges."""
-    from scipy.ndimage import zoom
+    from scipy.ndimage import binary_opening, zoom
     from scipy.spatial import cKDTree
 
-    burnt = _resized(panorama.image.min(2), size) >= settings.burnt
+    bright = _resized(panorama.image.min(2), size) >= settings.burnt
+    burnt = binary_opening(bright, np.ones((_LAMP_PX, _LAMP_PX), bool))
     if not burnt.any():
         return np.ones(size[::-1], np.float32)
     seeds = np.unique(np.rint(directions(panorama, *size)[burnt] * 100), axis=0) / 100
