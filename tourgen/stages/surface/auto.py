@@ -31,7 +31,7 @@ from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.stages.thin import voxel_groups
 
-VERSION = 5
+VERSION = 6
 Mask = npt.NDArray[np.bool_]
 
 

@@ -69,7 +69,7 @@ from tourgen.stages.surface.tangent_planes import (
     tangent_planes,
 )
 
-VERSION = 8
+VERSION = 9
 _APART = 3.0
 """Spacings between points that stand apart."""
 _HANDFUL = 12
