@@ -150,6 +150,28 @@ def _creases(points: Float32, true: Float32, truth: Truth) -> tuple[Bools, Float
     return flat, crease * 1000
 
 
+def room_figures(folder: Path, room: Room, given: bool) -> dict[str, float]:
+    """What comes of one room of a tour, without stations or with the true ones."""
+    truth = truth_of(folder, room.id)
+    cloud, full = prepared(room, folder)
+    spent = time.process_time
+    start = spent()
+    tangent_planes(cloud.points, SETTINGS.first_neighbours, SETTINGS.neighbours)
+    planes_s = spent() - start
+    stood = truth.stations if given else stations.find_stations(full, stations.Settings())
+    found_s = spent() - start - planes_s
+    oriented = normals.normals(cloud, stood, SETTINGS)
+    turned_s = spent() - start - 2 * planes_s
+    million = len(cloud) / 1e6
+    return {
+        "points": float(len(cloud)),
+        "stations": float(len(stood)),
+        "stations seconds": found_s,
+        "planes seconds a million": planes_s / million,
+        "turning seconds a million": turned_s / million,
+    } | figures(cloud.points, oriented.normals, truth)
+
+
 def main() -> int:
     """The command; 1 where a room misses its goals."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -161,24 +183,7 @@ def main() -> int:
     for room in load_tour(given.tour).rooms:
         if given.room and room.id not in given.room:
             continue
-        truth = truth_of(given.tour, room.id)
-        cloud, full = prepared(room, given.tour)
-        spent = time.process_time
-        start = spent()
-        tangent_planes(cloud.points, SETTINGS.first_neighbours, SETTINGS.neighbours)
-        planes_s = spent() - start
-        stood = truth.stations if given.given else stations.find_stations(full, stations.Settings())
-        found_s = spent() - start - planes_s
-        oriented = normals.normals(cloud, stood, SETTINGS)
-        turned_s = spent() - start - 2 * planes_s
-        million = len(cloud) / 1e6
-        facts = {
-            "points": float(len(cloud)),
-            "stations": float(len(stood)),
-            "stations seconds": found_s,
-            "planes seconds a million": planes_s / million,
-            "turning seconds a million": turned_s / million,
-        } | figures(cloud.points, oriented.normals, truth)
+        facts = room_figures(given.tour, room, given.given)
         print(room.id, *(f"  {name:24} {value:12.4f}" for name, value in facts.items()), sep="\n")
         reached &= facts["right"] >= GOAL_RIGHT
         reached &= facts["turning seconds a million"] <= GOAL_SECONDS_A_MILLION

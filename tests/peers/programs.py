@@ -12,8 +12,6 @@ room is that of the best of its settings there.
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,12 +19,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rooms import BenchRoom
+from apart import apart
+from rooms import BenchRoom, stamp
 
 from tourgen.geometry import Float32, Float64, Int32
 
 VERSION = 1
 """Raised when a recipe changes, so that cached meshes are made again."""
+LIMIT_S = 1800
+"""A peer that takes longer is stopped, and the table says so."""
 
 Mesh = tuple[Float64, Int32]
 
@@ -179,25 +180,25 @@ ATTEMPTS = (
 )
 
 
-def made(attempt: Attempt, room: BenchRoom, scratch: Path) -> Path:
-    """The mesh of one attempt, made in a process of its own unless it is there.
+def made(attempt: Attempt, room: BenchRoom, scratch: Path) -> Path | str:
+    """The mesh of one attempt, made in a process of its own unless it is there; why there is none.
+
+    What failed is not tried again: the reason lies beside, as ``.txt``.
 
     Returns:
         An ``.npz`` with ``vertices``, ``faces`` and ``seconds``.
     """
-    digest = f"{room.scan.stat().st_size}-{room.scan.stat().st_mtime_ns}"
-    name = f"{attempt.file_name}-v{VERSION}-{digest}.npz"
+    name = f"{attempt.file_name}-v{VERSION}-{stamp(room.scan)}.npz"
     file = scratch / "peers" / room.id / name
+    why = file.with_suffix(".txt")
+    if why.exists():
+        return why.read_text(encoding="utf-8")
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
-        # Idle threads that spin make a busy machine six times as slow.
-        os.environ["OMP_WAIT_POLICY"] = "passive"
-        spawn = multiprocessing.get_context("spawn")
-        worker = spawn.Process(target=_make, args=(attempt, room, file))
-        worker.start()
-        worker.join()
-        if worker.exitcode:
-            raise RuntimeError(f"{attempt.program} ({attempt.setting}) died on {room.id}")
+        failed = apart(_make, attempt, room, file, limit_s=LIMIT_S)
+        if failed:
+            why.write_text(failed, encoding="utf-8")
+            return failed
     return file
 
 

@@ -110,6 +110,12 @@ def _boxes(told: Sequence[dict[str, Sequence[float]]]) -> Iterator[Box]:
     return (Box(np.array(each["min"], float), np.array(each["max"], float)) for each in told)
 
 
+def stamp(file: Path) -> str:
+    """Of a file's state: its size and time of change."""
+    about = file.stat()
+    return f"{about.st_size}-{about.st_mtime_ns}"
+
+
 def read_scan(scan: Path) -> tuple[Float32, UInt8]:
     """Points, metres, and sRGB colours of a PLY, or of all scans of an E57."""
     if scan.suffix == ".ply":
