@@ -13,7 +13,7 @@ import orientation
 import registration
 from browsing import photographed, published
 from contestants import CHAINS, Contestant
-from drawing import draw
+from drawing import Camera, draw, relief
 from gaps import Gaps
 from ledger import Ledger, digest
 from picture_score import fitted_gain, score_pictures
@@ -22,7 +22,7 @@ from plaque import EDGES_MM, plaque_view, read_board
 from rooms import GALLERY, BenchRoom, stamp
 from seams import seam_figures
 from surface_score import Figures, Reference, Samples, surface_figures
-from true_picture import Shot, TexturedTruth, true_shots
+from true_picture import Shot, TexturedTruth, cameras_in, true_shots
 
 from tourgen.geometry import UInt8
 from tourgen.simulation.light import ray_scene
@@ -122,6 +122,24 @@ class Bench:
             **self.ledger.figures(f"gaps-{name}", gaps),
         }
 
+    def relief(self, one: Contestant | None) -> UInt8:
+        """The first camera's view of a contestant's bare surface, or of the true one."""
+
+        def take() -> list[UInt8]:
+            truth = self.reference.truth
+            vertices, faces = one.mesh if one else (truth.vertices, truth.faces)
+            shades = relief(vertices, faces, self.first_camera.position)
+            return [draw(ray_scene(vertices, faces), shades, self.first_camera)]
+
+        name = one.digest if one else "truth"
+        return self.ledger.pictures(f"relief-{name}-{self.truth_digest}", take)[0]
+
+    @cached_property
+    def first_camera(self) -> Camera:
+        """One of those that take pictures."""
+        truth = self.reference.truth
+        return cameras_in(truth.vertices, truth.scene)[0]
+
     def pictures(self, one: Contestant, budget: int) -> list[UInt8]:
         """What the room's cameras see of a contestant, and the plaque's after them.
 
@@ -195,10 +213,11 @@ class Bench:
         """How many normals are right without given stations, and how long turning takes."""
 
         def measure() -> Figures:
-            found = orientation.room_figures(tour, load_tour(tour).room(self.room.id), given=False)
+            room = load_tour(tour).room(self.room.id)
+            facts = orientation.oriented(tour, room, given=False).facts
             return {
-                "normals_right": found["right"],
-                "turning_s_a_million": found["turning seconds a million"],
+                "normals_right": facts["right"],
+                "turning_s_a_million": facts["turning seconds a million"],
             }
 
         code = "-".join(str(each.VERSION) for each in (sift, stations, normals))

@@ -65,6 +65,22 @@ def vertex_colored(colors: UInt8, faces: Int32) -> ColorsAt:
     return colors_at
 
 
+def relief(vertices: Float64, faces: Int32, eye: Float64) -> ColorsAt:
+    """Grey by the angle at which an eye looks at a face; red from behind."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    normal, way = np.cross(b - a, c - a), eye - (a + b + c) / 3
+    length = np.linalg.norm(normal, axis=1) * np.linalg.norm(way, axis=1)
+    cosine = (normal * way).sum(axis=1) / np.maximum(length, 1e-15)
+    grey = (40 + 210 * np.abs(cosine)).astype(np.uint8)
+    shades = np.repeat(grey[:, None], 3, axis=1)
+    shades[cosine < 0, 1:] //= 3
+
+    def colors_at(face: Ints, _: Float32) -> UInt8:
+        return shades[face]
+
+    return colors_at
+
+
 def blended(corners: Float32, share: Float32) -> Float32:
     """(n, k) values of (n, 3, k) at the corners, blended."""
     mixed: Float32 = corners[:, 0] * (1 - share.sum(axis=1))[:, None]

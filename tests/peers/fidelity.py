@@ -133,12 +133,12 @@ def _judged(room: BenchRoom, given: argparse.Namespace) -> RoomResult:
     for program in dict.fromkeys(one.name for one, _ in rows):
         columns[program] = best([row for row in rows if row[0].name == program])
     checks = bench.registered(given.tour, given.gallery)
-    sheets: list[Sheet] = []
+    sheets = [_reliefs(room.id, bench, columns, given)]
     if is_demo:
         inferred = reported_inferred(given.tour / "site", room.id)
         checks |= {"inferred_reported": inferred, **bench.oriented(given.tour)}
         if not given.skip_picture:
-            sheets = _pictured(tour, bench, columns, refused, given)
+            sheets += _pictured(tour, bench, columns, refused, given)
     return RoomResult(
         room=room.id,
         columns={name: figures for name, (_, figures) in columns.items()},
@@ -170,6 +170,15 @@ def _drawn(
             one = Contestant(method, "", (file,), None, room)
             columns[method] = one, bench.surface(one)
     return columns
+
+
+def _reliefs(
+    name: str, bench: Bench, columns: dict[str, Column], given: argparse.Namespace
+) -> Sheet:
+    """The bare surfaces side by side."""
+    shown = {"truth": bench.relief(None)}
+    shown |= {each: bench.relief(one) for each, (one, _) in columns.items()}
+    return report.side_by_side(shown, _sheets(given) / f"fidelity-{name}-relief.webp")
 
 
 def _pictured(
@@ -234,6 +243,7 @@ def _thinned(room: BenchRoom, given: argparse.Namespace) -> RoomResult:
         columns={name: figures for name, (_, figures) in columns.items()},
         refused=refused,
         told={name: one.told for name, (one, _) in columns.items() if one.told},
+        sheets=(_reliefs(THINNED, bench, columns, given),),
     )
 
 

@@ -25,9 +25,9 @@ Every column is one surface of the same scan: `published` is the tour's site as 
 follow the methods of `room.surface.method`, each with this tour.toml as far as the finest level of
 detail, and the best of three settings of each peer. `oracle`: the scan's true points in true
 colours, baked onto the true mesh by the same stages; `panoramas`: the room published from its E57,
-coloured by the panoramas in it. Peers get the scan within the same `keep` and `remove` boxes, drop
-outliers by their own filter, find normals by their own, and have these turned towards the true
-stations for them; Poisson's invented surface is cut by density.
+coloured by the panoramas in it. Peers get the scan cropped to the room, drop outliers by their own
+filter, find normals by their own, and have these turned towards the true stations for them;
+Poisson's invented surface is cut by density.
 
 - `precision` and `recall` at a distance are shares of the mesh near the truth, and of the truth
   that a station sees near the mesh; the F-score is their harmonic mean. Mesh over 30 mm behind

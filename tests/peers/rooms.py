@@ -17,6 +17,7 @@ from tourgen.geometry import Float32, Float64, UInt8
 
 Bools = npt.NDArray[np.bool_]
 GALLERY = "gallery_sim"
+AROUND_M = 0.1
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,13 @@ class BenchRoom:
         for box in self.remove:
             kept &= ~box.holds(points)
         return points[kept], colors[kept]
+
+    def cropped(self) -> Float32:
+        """The cloud's points in and near the room, as one would crop them by hand."""
+        points, _ = self.cloud()
+        seen = self.truth().vertices
+        room = Box(seen.min(axis=0) - AROUND_M, seen.max(axis=0) + AROUND_M)
+        return points[room.holds(points)]
 
 
 def demo_rooms(tour: Path) -> list[BenchRoom]:
