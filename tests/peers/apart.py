@@ -32,5 +32,6 @@ def apart(work: Callable[..., None], *given: Any, limit_s: int | None = None) ->
 
 def _limited(limit_s: int | None, work: Callable[..., None], given: tuple[Any, ...]) -> None:
     if limit_s:
-        resource.setrlimit(resource.RLIMIT_CPU, (limit_s, resource.RLIM_INFINITY))
+        _, most = resource.getrlimit(resource.RLIMIT_CPU)
+        resource.setrlimit(resource.RLIMIT_CPU, (limit_s, most))
     work(*given)
