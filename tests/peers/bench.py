@@ -74,7 +74,7 @@ class Bench:
     @cached_property
     def gaps(self) -> Gaps:
         """Where nobody measured, and where nothing is."""
-        return Gaps.of(self.reference.truth)
+        return Gaps.of(self.room, self.reference.truth)
 
     @cached_property
     def rails(self) -> Rails:

@@ -1,17 +1,20 @@
 """Whether gaps of the scan are closed where there is a surface, and stay open where there is none.
 
 The disc under each tripod is where beams steeper than its scanner looks would have ended: seen by
-other stations in part, or by none. An opening is a patch of directions in which a station sees
-nothing at all, neither shell nor furniture: a door, a window, a porthole.
+other stations in part, or by none. Openings are doors, windows and portholes: judged straight
+through each, where the truth knows it, and by all directions in which a station sees nothing.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_erosion, label
+from rooms import BenchRoom
+from scipy.ndimage import binary_erosion
 from score import LOWEST, Truth
 from surface_score import Figures
 
@@ -23,10 +26,44 @@ CLOSED_M = 0.020
 DISC_BEAMS = 20_000
 STEP_DEG = 0.2
 RIM_STEPS = 2
-"""So near to its rim, some 20 mm, an opening is not judged."""
-LEAST_BEAMS = 50
-"""Fewer are a slit between two things, or an opening seen edge on."""
+RIM_M = 0.020
+"""So near to its rim an opening is not judged."""
+PANE_M = 0.010
+"""Between beams straight through an opening."""
+BESIDE_M = 0.1
+"""They begin so far before the wall, and end so far behind it."""
+FAR_M = 1e3
+"""Beyond all that a scan holds."""
 Bools = npt.NDArray[np.bool_]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Beams:
+    """Lines on which the truth has no surface.
+
+    Attributes:
+        origins: (n, 3) metres.
+        ways: (n, 3) unit.
+        length_m: (n,)
+        group: (n,) what they belong to.
+    """
+
+    origins: Float64
+    ways: Float64
+    length_m: Float64
+    group: Ints
+
+    def free(self, scene: Any) -> Bools:
+        """(n,) which meet no surface of a scene."""
+        reach = scene.cast_rays(rays_of(self.origins, self.ways))["t_hit"].numpy()
+        return np.asarray(reach > self.length_m)
+
+    def take(self, chosen: Bools) -> Beams:
+        """Some of them."""
+        return Beams(
+            self.origins[chosen], self.ways[chosen], self.length_m[chosen], self.group[chosen]
+        )
 
 
 @dataclass(frozen=True)
@@ -37,23 +74,21 @@ class Gaps:
         under: (n, 3) places on the true surface right under the stations, even over a level floor.
         disc: (n,) number of the station that each lies under.
         unseen: (n,) no station sees it.
-        origins: (m, 3) of beams that meet nothing, and
-        ways: (m, 3) their directions.
-        opening: (m,) number of the opening that each passes: each station's count for themselves.
+        outlook: From each station.
+        through: Straight through each opening.
     """
 
     under: Float64
-    disc: npt.NDArray[np.int64]
+    disc: Ints
     unseen: Bools
-    origins: Float64
-    ways: Float64
-    opening: npt.NDArray[np.int64]
+    outlook: Beams
+    through: Beams
 
     @classmethod
-    def of(cls, truth: Truth) -> Gaps:
+    def of(cls, room: BenchRoom, truth: Truth) -> Gaps:
         """Look around from every station."""
-        under, disc, unseen = _discs(truth)
-        return cls(under, disc, unseen, *_openings(truth))
+        through = _through(room.facts()["openings"])
+        return cls(*_discs(truth), _outlook(truth), through.take(through.free(truth.scene)))
 
     def figures(self, vertices: Float64, faces: Int32) -> Figures:
         """How one mesh treats them."""
@@ -68,21 +103,22 @@ class Gaps:
         }
         if self.unseen.any():
             figures["blind_closed_share"] = float(closed[self.unseen].mean())
-        if len(self.opening):
-            reach = scene.cast_rays(rays_of(self.origins, self.ways))["t_hit"].numpy()
-            free = np.isinf(reach)
+        if len(self.outlook.group):
+            figures["outlook_free_share"] = float(self.outlook.free(scene).mean())
+        if len(self.through.group):
+            free = self.through.free(scene)
             figures["openings_free_share"] = float(free.mean())
-            figures["opening_worst_free_share"] = _worst(free, self.opening)
+            figures["opening_worst_free_share"] = _worst(free, self.through.group)
         return figures
 
 
-def _worst(good: Bools, group: npt.NDArray[np.int64]) -> float:
+def _worst(good: Bools, group: Ints) -> float:
     """The least share of good ones in a group."""
     total = np.bincount(group)
     return float((np.bincount(group, good)[total > 0] / total[total > 0]).min())
 
 
-def _discs(truth: Truth) -> tuple[Float64, npt.NDArray[np.int64], Bools]:
+def _discs(truth: Truth) -> tuple[Float64, Ints, Bools]:
     """Places under the stations, under which, and whether no station sees them."""
     rng = np.random.default_rng(3)
     radius = np.sqrt(1 / LOWEST**2 - 1) * np.sqrt(rng.random(DISC_BEAMS))
@@ -97,23 +133,49 @@ def _discs(truth: Truth) -> tuple[Float64, npt.NDArray[np.int64], Bools]:
     return under, hit // DISC_BEAMS, ~truth.seen(under, face[hit].astype(np.int64))
 
 
-def _openings(truth: Truth) -> tuple[Float64, Float64, npt.NDArray[np.int64]]:
-    """Beams that meet nothing, where they start and go, and which opening they pass."""
+def _outlook(truth: Truth) -> Beams:
+    """Beams of the stations that meet nothing, nor do those next to them."""
     elevation = np.radians(np.arange(np.degrees(np.arcsin(LOWEST)), 85, STEP_DEG))
     azimuth = np.radians(np.arange(0, 360, STEP_DEG))
     el, az = np.meshgrid(elevation, azimuth, indexing="ij")
     ways = np.stack([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)], axis=-1)
-    places, directions, numbers = [np.empty((0, 3))], [np.empty((0, 3))], [np.empty(0, np.int64)]
-    for station in truth.stations:
-        origins = np.broadcast_to(station, (el.size, 3))
-        reach = truth.scene.cast_rays(rays_of(origins, ways.reshape(-1, 3)))["t_hit"].numpy()
-        free = np.isinf(reach).reshape(el.shape)
-        seam = int(free.sum(axis=0).argmin())  # cuts the panorama open beside the openings
-        inner = binary_erosion(np.roll(free, -seam, axis=1), iterations=RIM_STEPS)
-        patch = np.roll(label(inner)[0], seam, axis=1)
-        large = np.isin(patch, 1 + np.flatnonzero(np.bincount(patch.ravel())[1:] >= LEAST_BEAMS))
-        places.append(np.broadcast_to(station, (int(large.sum()), 3)))
-        directions.append(ways[large])
-        before = max(int(each.max(initial=0)) for each in numbers)
-        numbers.append(patch[large].astype(np.int64) + before)
-    return np.concatenate(places), np.concatenate(directions), np.concatenate(numbers)
+    number = len(truth.stations)
+    beams = Beams(
+        np.repeat(truth.stations, el.size, axis=0),
+        np.tile(ways.reshape(-1, 3), (number, 1)),
+        np.full(number * el.size, FAR_M),
+        np.repeat(np.arange(number), el.size),
+    )
+    panoramas = beams.free(truth.scene).reshape(number, *el.shape)
+    wrapped = np.pad(panoramas, [(0, 0), (0, 0), (RIM_STEPS, RIM_STEPS)], mode="wrap")
+    plus = np.array([[[0, 1, 0], [1, 1, 1], [0, 1, 0]]], np.bool_)
+    inner = binary_erosion(wrapped, plus, iterations=RIM_STEPS)
+    return beams.take(inner[:, :, RIM_STEPS:-RIM_STEPS].ravel())
+
+
+def _through(openings: Sequence[dict[str, Any]]) -> Beams:
+    """Beams straight through openings, from before the wall to behind it."""
+    none = Beams(np.empty((0, 3)), np.empty((0, 3)), np.empty(0), np.empty(0, np.int64))
+    parts = [none, *(_pane(each, number) for number, each in enumerate(openings))]
+    return Beams(
+        np.concatenate([part.origins for part in parts]),
+        np.concatenate([part.ways for part in parts]),
+        np.concatenate([part.length_m for part in parts]),
+        np.concatenate([part.group for part in parts]),
+    )
+
+
+def _pane(opening: dict[str, Any], number: int) -> Beams:
+    """Beams straight through one."""
+    half = np.array([opening["width"], opening["height"]]) / 2 - RIM_M
+    at = np.stack(np.meshgrid(*(np.arange(-h, h, PANE_M) for h in half)), -1).reshape(-1, 2)
+    if opening["kind"] == "porthole":
+        at = at[np.hypot(*(at / half).T) <= 1]
+    outward, before = np.array(opening["outward"]), opening["depth"] + BESIDE_M
+    pane = opening["center"] + at @ np.array([opening["right"], opening["up"]])
+    return Beams(
+        pane - before * outward,
+        np.tile(outward, (len(at), 1)),
+        np.full(len(at), before + BESIDE_M),
+        np.full(len(at), number),
+    )

@@ -25,6 +25,8 @@ import surface_score
 import thinned
 import variants
 from drawing import Camera, draw, vertex_colored
+from gaps import Gaps
+from rooms import BenchRoom
 from true_picture import Shot
 
 from tourgen.simulation.light import ray_scene
@@ -111,6 +113,77 @@ def test_flat_walls_and_floor_are_measured(truth: score.Truth) -> None:
     tilted = truth.vertices + truth.vertices[:, :1] * [0, 0, np.tan(np.radians(0.2))]
     figures = flat.figures(surface_score.Samples.of(tilted, truth.faces, truth))
     assert figures["floor_normals_deg"] == pytest.approx(0.2, abs=0.02)
+
+
+def quads(*corners: tuple[list[float], ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of some."""
+    faces = [[4 * k, 4 * k + b, 4 * k + b + 1] for k in range(len(corners)) for b in (1, 2)]
+    return np.array(corners, np.float64).reshape(-1, 3), np.array(faces, np.int32)
+
+
+def upright(low: tuple[float, float], high: tuple[float, float]) -> tuple[list[float], ...]:
+    """A piece of the wall x = 2."""
+    (y, z), (back, top) = low, high
+    return [2.0, y, z], [2.0, back, z], [2.0, back, top], [2.0, y, top]
+
+
+def level(low: float, high: float, z: float) -> tuple[list[float], ...]:
+    """A piece of the floor, from wall to wall."""
+    return [low, -2.0, z], [high, -2.0, z], [high, 2.0, z], [low, 2.0, z]
+
+
+@pytest.fixture(scope="module")
+def windowed(tmp_path_factory: pytest.TempPathFactory) -> BenchRoom:
+    """The box with a window of 1 m x 1 m in the wall x = 2."""
+    import open3d as o3d
+
+    pieces = [((-2, 0), (2, 1)), ((-2, 2), (2, 2.5)), ((-2, 1), (-0.5, 2)), ((0.5, 1), (2, 2))]
+    vertices, faces = score.joined(
+        [(CORNERS, FACES[:-2]), quads(*[upright(low, high) for low, high in pieces])]
+    )
+    folder = tmp_path_factory.mktemp("windowed")
+    mesh = o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(faces)
+    )
+    o3d.io.write_triangle_mesh(str(folder / "box.ply"), mesh)
+    stations = [{"position": [x, 0, 1.0]} for x in (-0.8, 0.6)]
+    window = {"kind": "window", "width": 1.0, "height": 1.0, "depth": 0.0, "center": [2, 0, 1.5]}
+    window |= {"right": [0, -1, 0], "up": [0, 0, 1], "outward": [1, 0, 0]}
+    facts = {"stations": stations, "mirror_faces": [], "openings": [window]}
+    (folder / "box.json").write_text(json.dumps(facts), encoding="utf-8")
+    return BenchRoom("box", folder / "box.e57", folder, None, ())
+
+
+def test_gaps_of_the_truth_are_closed_and_its_window_is_open(windowed: BenchRoom) -> None:
+    truth = windowed.truth()
+    figures = Gaps.of(windowed, truth).figures(truth.vertices, truth.faces)
+    assert len(figures) == 5
+    assert set(figures.values()) == {1.0}
+
+
+def test_a_curtain_and_a_hump_under_a_tripod_are_told(windowed: BenchRoom) -> None:
+    truth = windowed.truth()
+    mesh = score.joined(
+        [
+            (truth.vertices, truth.faces[2:]),
+            quads(level(-2, 0, 0.03), level(0, 2, 0.01), upright((-0.5, 1), (0, 2))),
+        ]
+    )
+    figures = Gaps.of(windowed, truth).figures(*mesh)
+    assert figures["discs_closed_share"] == pytest.approx(0.5, abs=0.01)
+    assert figures["disc_worst_closed_share"] < 0.03
+    for name in ("outlook_free_share", "openings_free_share", "opening_worst_free_share"):
+        assert figures[name] == pytest.approx(0.5, abs=0.03)
+
+
+def test_a_disc_that_no_other_station_sees_is_told_apart(windowed: BenchRoom) -> None:
+    truth = windowed.truth()
+    assert not Gaps.of(windowed, truth).unseen.any()
+    truth.stations = truth.stations[:1]
+    alone = Gaps.of(windowed, truth)
+    assert alone.unseen.mean() > 0.99
+    assert alone.figures(truth.vertices, truth.faces)["blind_closed_share"] == 1
+    assert alone.figures(truth.vertices, truth.faces[2:])["blind_closed_share"] < 0.1
 
 
 def test_creases_are_found_where_they_are(truth: score.Truth) -> None:
