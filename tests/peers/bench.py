@@ -22,7 +22,7 @@ from plaque import EDGES_MM, plaque_view, read_board
 from rooms import GALLERY, BenchRoom, stamp
 from seams import seam_figures
 from surface_score import Figures, Reference, Samples, surface_figures
-from true_picture import Shot, TexturedTruth, cameras_in, true_shots
+from true_picture import Shot, TexturedTruth, busiest, cameras_in, true_shots
 
 from tourgen.geometry import UInt8
 from tourgen.simulation.light import ray_scene
@@ -123,22 +123,28 @@ class Bench:
         }
 
     def relief(self, one: Contestant | None) -> UInt8:
-        """The first camera's view of a contestant's bare surface, or of the true one."""
+        """The busiest camera's view of a contestant's bare surface, or of the true one."""
+        camera = self.cameras[self.busiest[0]]
 
         def take() -> list[UInt8]:
             truth = self.reference.truth
             vertices, faces = one.mesh if one else (truth.vertices, truth.faces)
-            shades = relief(vertices, faces, self.first_camera.position)
-            return [draw(ray_scene(vertices, faces), shades, self.first_camera)]
+            shades = relief(vertices, faces, camera.position)
+            return [draw(ray_scene(vertices, faces), shades, camera)]
 
         name = one.digest if one else "truth"
         return self.ledger.pictures(f"relief-{name}-{self.truth_digest}", take)[0]
 
     @cached_property
-    def first_camera(self) -> Camera:
-        """One of those that take pictures."""
+    def cameras(self) -> tuple[Camera, ...]:
+        """That take the room's pictures."""
         truth = self.reference.truth
-        return cameras_in(truth.vertices, truth.scene)[0]
+        return cameras_in(truth.vertices, truth.scene)
+
+    @cached_property
+    def busiest(self) -> list[int]:
+        """Their numbers, those first that see most."""
+        return busiest(self.cameras, self.reference.truth.scene)
 
     def pictures(self, one: Contestant, budget: int) -> list[UInt8]:
         """What the room's cameras see of a contestant, and the plaque's after them.
@@ -147,7 +153,7 @@ class Bench:
             one: Published, or a peer's mesh.
             budget: Bytes that a peer's whole chain may take.
         """
-        cameras = list(self.textured.cameras)
+        cameras = list(self.cameras)
         if self.room.id in EDGES_MM:
             cameras.append(plaque_view(self.room.id)[0])
 

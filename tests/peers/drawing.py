@@ -68,15 +68,16 @@ def vertex_colored(colors: UInt8, faces: Int32) -> ColorsAt:
 def relief(vertices: Float64, faces: Int32, eye: Float64) -> ColorsAt:
     """Grey by the angle at which an eye looks at a face; red from behind."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
-    normal, way = np.cross(b - a, c - a), eye - (a + b + c) / 3
-    length = np.linalg.norm(normal, axis=1) * np.linalg.norm(way, axis=1)
-    cosine = (normal * way).sum(axis=1) / np.maximum(length, 1e-15)
-    grey = (40 + 210 * np.abs(cosine)).astype(np.uint8)
-    shades = np.repeat(grey[:, None], 3, axis=1)
-    shades[cosine < 0, 1:] //= 3
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-15)
+    ways = (eye - vertices).astype(np.float32)
 
-    def colors_at(face: Ints, _: Float32) -> UInt8:
-        return shades[face]
+    def colors_at(face: Ints, share: Float32) -> UInt8:
+        way = blended(ways[faces[face]], share)
+        cosine = (normal[face] * way).sum(axis=1) / np.linalg.norm(way, axis=1)
+        shades = np.repeat((40 + 210 * np.abs(cosine))[:, None], 3, axis=1).astype(np.uint8)
+        shades[cosine < 0, 1:] //= 3
+        return shades
 
     return colors_at
 

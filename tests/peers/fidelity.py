@@ -204,7 +204,10 @@ def _pictured(
         columns[name] = one, figures | bench.picture(one, budget)
         shown[name] = bench.pictures(one, budget)
     shown = {"truth": bench.true_pictures(), **shown}
-    numbers = [*report.SHOWN_CAMERAS, *range(len(bench.shots), len(shown["truth"]))]
+    numbers = [
+        *bench.busiest[: report.SHOWN_CAMERAS],
+        *range(len(bench.shots), len(shown["truth"])),
+    ]
     return [
         report.side_by_side(
             {name: pictures[number] for name, pictures in shown.items()},

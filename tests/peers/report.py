@@ -15,7 +15,8 @@ from sections import rewrite
 from tourgen.geometry import UInt8
 
 HEADING = "Fidelity"
-SHOWN_CAMERAS = (0, 7)
+SHOWN_CAMERAS = 2
+"""So many, those that see most."""
 SHOWN_SIZE = (640, 360)
 ASIDE = 2
 """Pictures in a row."""
