@@ -102,6 +102,10 @@ class Bench:
 
     def surface(self, one: Contestant) -> Figures:
         """What a contestant's surface is worth."""
+        return {**self.shape(one), **self.gapped(one)}
+
+    def shape(self, one: Contestant) -> Figures:
+        """How true it is, its planes, creases and rails."""
 
         def measure() -> Figures:
             vertices, faces = one.mesh
@@ -113,14 +117,13 @@ class Bench:
                 **self.rails.figures(vertices, faces),
             }
 
-        def gaps() -> Figures:
-            return self.gaps.figures(*one.mesh)
+        return self.ledger.figures(f"surface-{one.digest}-{self.truth_digest}", measure)
 
-        name = f"{one.digest}-{self.truth_digest}"
-        return {
-            **self.ledger.figures(f"surface-{name}", measure),
-            **self.ledger.figures(f"gaps-{name}", gaps),
-        }
+    def gapped(self, one: Contestant) -> Figures:
+        """What it closes and leaves open."""
+        return self.ledger.figures(
+            f"gaps-{one.digest}-{self.truth_digest}", lambda: self.gaps.figures(*one.mesh)
+        )
 
     def relief(self, one: Contestant | None) -> UInt8:
         """The busiest camera's view of a contestant's bare surface, or of the true one."""
