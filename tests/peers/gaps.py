@@ -21,17 +21,17 @@ from surface_score import Figures
 from tourgen.geometry import Float64, Int32
 from tourgen.simulation.light import ray_scene, rays_of
 
-CLOSED_M = 0.020
-"""A disc is closed where the mesh lies so near to it."""
+TRUE_M = 0.020
+"""A disc is laid where it truly lies where the mesh is so near to it."""
 DISC_BEAMS = 20_000
 STEP_DEG = 0.2
-RIM_STEPS = 2
-RIM_M = 0.020
-"""So near to its rim an opening is not judged."""
+"""Between the beams of a station."""
 PANE_M = 0.010
 """Between beams straight through an opening."""
+RIM_STEPS = 2
+"""So near to its rim, some 20 mm, an opening is not judged."""
 BESIDE_M = 0.1
-"""They begin so far before the wall, and end so far behind it."""
+"""They begin so far before the wall, and end so far behind it, as those to a disc do."""
 FAR_M = 1e3
 """Beyond all that a scan holds."""
 Bools = npt.NDArray[np.bool_]
@@ -71,15 +71,16 @@ class Gaps:
     """A room's blind discs and openings.
 
     Attributes:
-        under: (n, 3) places on the true surface right under the stations, even over a level floor.
-        disc: (n,) number of the station that each lies under.
-        unseen: (n,) no station sees it.
+        down: From each station to the true surface under it and as far behind that as counts, even
+            over a level floor.
+        under: (n, 3) where they meet it.
+        unseen: (n,) no station sees that.
         outlook: From each station.
         through: Straight through each opening.
     """
 
+    down: Beams
     under: Float64
-    disc: Ints
     unseen: Bools
     outlook: Beams
     through: Beams
@@ -87,8 +88,8 @@ class Gaps:
     @classmethod
     def of(cls, room: BenchRoom, truth: Truth) -> Gaps:
         """Look around from every station."""
-        through = _through(room.facts()["openings"])
-        return cls(*_discs(truth), _outlook(truth), through.take(through.free(truth.scene)))
+        through = _through(room.facts()["openings"], truth)
+        return cls(*_discs(truth), _outlook(truth), through)
 
     def figures(self, vertices: Float64, faces: Int32) -> Figures:
         """How one mesh treats them."""
@@ -96,13 +97,17 @@ class Gaps:
 
         scene = ray_scene(vertices, faces)
         places = o3d.core.Tensor(self.under.astype(np.float32))
-        closed = scene.compute_distance(places).numpy() <= CLOSED_M
+        true = scene.compute_distance(places).numpy() <= TRUE_M
+        closed = ~self.down.free(scene)
         figures: Figures = {
             "discs_closed_share": float(closed.mean()),
-            "disc_worst_closed_share": _worst(closed, self.disc),
+            "disc_worst_closed_share": _worst(closed, self.down.group),
+            "discs_true_share": float(true.mean()),
+            "disc_worst_true_share": _worst(true, self.down.group),
         }
         if self.unseen.any():
             figures["blind_closed_share"] = float(closed[self.unseen].mean())
+            figures["blind_true_share"] = float(true[self.unseen].mean())
         if len(self.outlook.group):
             figures["outlook_free_share"] = float(self.outlook.free(scene).mean())
         if len(self.through.group):
@@ -118,19 +123,21 @@ def _worst(good: Bools, group: Ints) -> float:
     return float((np.bincount(group, good)[total > 0] / total[total > 0]).min())
 
 
-def _discs(truth: Truth) -> tuple[Float64, Ints, Bools]:
-    """Places under the stations, under which, and whether no station sees them."""
+def _discs(truth: Truth) -> tuple[Beams, Float64, Bools]:
+    """Beams down from the stations, what they meet, and whether no station sees it."""
     rng = np.random.default_rng(3)
     radius = np.sqrt(1 / LOWEST**2 - 1) * np.sqrt(rng.random(DISC_BEAMS))
     around = 2 * np.pi * rng.random(DISC_BEAMS)
     ways = np.stack([radius * np.cos(around), radius * np.sin(around), -np.ones(DISC_BEAMS)], 1)
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     origins = np.repeat(truth.stations, DISC_BEAMS, axis=0)
     ways = np.tile(ways, (len(truth.stations), 1))
     met = truth.scene.cast_rays(rays_of(origins, ways))
-    reach, face = met["t_hit"].numpy(), met["primitive_ids"].numpy()
-    hit = np.flatnonzero(np.isfinite(reach))
+    reach, face = met["t_hit"].numpy().astype(np.float64), met["primitive_ids"].numpy()
+    down = Beams(origins, ways, reach + BESIDE_M, np.arange(len(ways)) // DISC_BEAMS)
+    hit = np.isfinite(reach)
     under = origins[hit] + reach[hit, None] * ways[hit]
-    return under, hit // DISC_BEAMS, ~truth.seen(under, face[hit].astype(np.int64))
+    return down.take(hit), under, ~truth.seen(under, face[hit].astype(np.int64))
 
 
 def _outlook(truth: Truth) -> Beams:
@@ -153,10 +160,10 @@ def _outlook(truth: Truth) -> Beams:
     return beams.take(inner[:, :, RIM_STEPS:-RIM_STEPS].ravel())
 
 
-def _through(openings: Sequence[dict[str, Any]]) -> Beams:
-    """Beams straight through openings, from before the wall to behind it."""
+def _through(openings: Sequence[dict[str, Any]], truth: Truth) -> Beams:
+    """Beams straight through openings that meet nothing, nor do those around them."""
     none = Beams(np.empty((0, 3)), np.empty((0, 3)), np.empty(0), np.empty(0, np.int64))
-    parts = [none, *(_pane(each, number) for number, each in enumerate(openings))]
+    parts = [none, *(_pane(each, number, truth) for number, each in enumerate(openings))]
     return Beams(
         np.concatenate([part.origins for part in parts]),
         np.concatenate([part.ways for part in parts]),
@@ -165,17 +172,18 @@ def _through(openings: Sequence[dict[str, Any]]) -> Beams:
     )
 
 
-def _pane(opening: dict[str, Any], number: int) -> Beams:
-    """Beams straight through one."""
-    half = np.array([opening["width"], opening["height"]]) / 2 - RIM_M
-    at = np.stack(np.meshgrid(*(np.arange(-h, h, PANE_M) for h in half)), -1).reshape(-1, 2)
-    if opening["kind"] == "porthole":
-        at = at[np.hypot(*(at / half).T) <= 1]
+def _pane(opening: dict[str, Any], number: int, truth: Truth) -> Beams:
+    """Those through one, from before the wall to behind it."""
+    half = opening["width"] / 2, opening["height"] / 2
+    across, along = np.meshgrid(*(np.arange(-h, h, PANE_M) for h in half))
     outward, before = np.array(opening["outward"]), opening["depth"] + BESIDE_M
+    at = np.stack([across.ravel(), along.ravel()], axis=1)
     pane = opening["center"] + at @ np.array([opening["right"], opening["up"]])
-    return Beams(
+    beams = Beams(
         pane - before * outward,
         np.tile(outward, (len(at), 1)),
         np.full(len(at), before + BESIDE_M),
         np.full(len(at), number),
     )
+    free = beams.free(truth.scene).reshape(across.shape)
+    return beams.take(binary_erosion(free, iterations=RIM_STEPS).ravel())

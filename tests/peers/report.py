@@ -38,10 +38,11 @@ Poisson's invented surface is cut by density.
   `crease`: distance of the mesh's own creases from the true ones, and the share within 4 mm.
   `rails`: the bed's and the stair's rods of 20 mm, the share of them with mesh within 5 mm, and
   how many are broken, that is lack two slices of 10 mm in a row.
-- `discs`: of the true floor under the tripods, the share with mesh within 20 mm, in all, under the
-  worst, and (`blind`) where no station sees it. `openings`: of the area of doors and windows,
-  20 mm within their rims, the share that one sees straight through, in all and of the worst;
-  `outlook`: of the directions in which a station sees no surface, the share without mesh.
+- `discs`: of what truly lies under the tripods, the share that is closed (mesh before it or less
+  than 100 mm behind) and true (within 20 mm), in all, under the worst, and (`blind`) where no
+  station sees it. `openings`: of the area of doors and windows, 20 mm within their rims, the share
+  that one sees straight through, in all and of the worst; `outlook`: of the directions in which a
+  station sees no surface, the share without mesh.
 - `psnr` and `ssim`: ten views a room of 960 x 540 pixels, in Chromium, against the textured
   truth; glass, mirror and lamp masked, one gain a channel and room fitted first. Peers are
   decimated and coloured by their own chain to the bytes of the published room, and drawn by ray

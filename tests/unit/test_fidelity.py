@@ -157,7 +157,7 @@ def windowed(tmp_path_factory: pytest.TempPathFactory) -> BenchRoom:
 def test_gaps_of_the_truth_are_closed_and_its_window_is_open(windowed: BenchRoom) -> None:
     truth = windowed.truth()
     figures = Gaps.of(windowed, truth).figures(truth.vertices, truth.faces)
-    assert len(figures) == 5
+    assert len(figures) == 7
     assert set(figures.values()) == {1.0}
 
 
@@ -170,8 +170,9 @@ def test_a_curtain_and_a_hump_under_a_tripod_are_told(windowed: BenchRoom) -> No
         ]
     )
     figures = Gaps.of(windowed, truth).figures(*mesh)
-    assert figures["discs_closed_share"] == pytest.approx(0.5, abs=0.01)
-    assert figures["disc_worst_closed_share"] < 0.03
+    assert figures["disc_worst_closed_share"] == 1
+    assert figures["discs_true_share"] == pytest.approx(0.5, abs=0.01)
+    assert figures["disc_worst_true_share"] < 0.03
     for name in ("outlook_free_share", "openings_free_share", "opening_worst_free_share"):
         assert figures[name] == pytest.approx(0.5, abs=0.03)
 
@@ -182,8 +183,9 @@ def test_a_disc_that_no_other_station_sees_is_told_apart(windowed: BenchRoom) ->
     truth.stations = truth.stations[:1]
     alone = Gaps.of(windowed, truth)
     assert alone.unseen.mean() > 0.99
-    assert alone.figures(truth.vertices, truth.faces)["blind_closed_share"] == 1
-    assert alone.figures(truth.vertices, truth.faces[2:])["blind_closed_share"] < 0.1
+    for faces, share in ((truth.faces, 1.0), (truth.faces[2:], 0.0)):
+        figures = alone.figures(truth.vertices, faces)
+        assert figures["blind_closed_share"] == figures["blind_true_share"] == share
 
 
 def test_creases_are_found_where_they_are(truth: score.Truth) -> None:
