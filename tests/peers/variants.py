@@ -133,4 +133,6 @@ def _build(variant: Tour, why: Path) -> None:
 
 
 def _announce(at: Task[Any] | Started) -> None:
-    print(f"  {at.stage if isinstance(at, Started) else at.name}", flush=True)
+    stage = at.stage if isinstance(at, Started) else at.name
+    if stage:  # "" when a room is done
+        print(f"  {stage}", flush=True)
