@@ -120,7 +120,10 @@ class MeshlabBallPivoting:
     radii_mm: tuple[float, ...]
 
     def __call__(self, points: Float32, stations: Float64) -> Mesh:
-        """Outliers by local probability (32 neighbours, 0.8), normals of 16, thinning, balls."""
+        """Outliers by local probability (32 neighbours, 0.8), normals of 16, thinning, balls.
+
+        Whole parts come out inside out: faces are turned to the stations, as normals were before.
+        """
         import pymeshlab
 
         meshes = _meshlab_cloud(points, stations)
@@ -131,7 +134,8 @@ class MeshlabBallPivoting:
             meshes.generate_surface_reconstruction_ball_pivoting(
                 ballradius=pymeshlab.PureValue(radius_mm / 1000)
             )
-        return _of_meshlab(meshes)
+        vertices, faces = _of_meshlab(meshes)
+        return vertices, facing_stations(vertices, faces, stations)
 
 
 def _meshlab_cloud(points: Float32, stations: Float64) -> Any:
@@ -163,6 +167,15 @@ def toward_stations(points: Float64, normals: Float64, stations: Float64) -> Flo
     nearest = cKDTree(stations).query(points)[1]
     away = ((stations[nearest] - points) * normals).sum(axis=1) < 0
     turned: Float64 = np.where(away[:, None], -normals, normals)
+    return turned
+
+
+def facing_stations(vertices: Float64, faces: Int32, stations: Float64) -> Int32:
+    """The faces, each turned towards the station nearest to it."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    away = (toward_stations((a + b + c) / 3, normals, stations) * normals).sum(axis=1) < 0
+    turned: Int32 = np.where(away[:, None], faces[:, ::-1], faces)
     return turned
 
 

@@ -16,6 +16,7 @@ import numpy as np
 import picture_score
 import planes
 import plaque
+import programs
 import pytest
 import report
 import results
@@ -319,6 +320,14 @@ def test_a_thinned_scan_has_the_points_asked_for_and_even(monkeypatch: pytest.Mo
     kept = points[thinned.kept(points)]
     assert 1900 <= len(kept) <= 2000
     assert (kept.max(axis=1) < 0.3).mean() == pytest.approx(0.09, abs=0.01)
+
+
+def test_faces_are_turned_to_the_stations() -> None:
+    flipped = FACES.copy()
+    flipped[::2] = flipped[::2, ::-1]
+    turned = programs.facing_stations(CORNERS, flipped, np.array([[0.0, 0.0, 1.5]]))
+    normals = surface_score.face_normals(CORNERS, turned)
+    assert np.allclose(normals, surface_score.face_normals(CORNERS, FACES))
 
 
 PEER = "Open3D Poisson"
