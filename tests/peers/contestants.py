@@ -18,7 +18,6 @@ from score import load
 from tourgen.geometry import Float64, Int32
 from tourgen.tour import Surface
 
-PUBLISHED = "published"
 CHAINS: dict[str, Callable[[Float64, Int32, BenchRoom, int], chains.Painted]] = {
     OPEN3D_POISSON: chains.vertex_chain,
     MESHLAB_POISSON: chains.texture_chain,

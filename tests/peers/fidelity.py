@@ -20,8 +20,8 @@ import oracle
 import report
 from aims import ORACLE, PANORAMAS, short_of
 from bench import Bench, reported_inferred
-from contestants import PUBLISHED, Contestant
-from results import RoomResult, Sheet, Try, save, saved
+from contestants import Contestant
+from results import PUBLISHED, RoomResult, Sheet, Try, save, saved
 from rooms import GALLERY, BenchRoom, demo_rooms, gallery
 from surface_score import Figures, best
 from thinned import POINTS, ROOM, thinned_room, thinned_tour
@@ -33,6 +33,7 @@ from tourgen.tour import Tour, load_tour
 THINNED = f"{ROOM}-thinned"
 COLORED_BY_PANORAMAS = ("chamber1",)
 """Rooms that are published once more, from their E57."""
+AS_ASKED = "as asked for"
 
 Column = tuple[Contestant, Figures]
 
@@ -148,7 +149,7 @@ def _judged(room: BenchRoom, given: argparse.Namespace) -> RoomResult:
             *(Try(program, setting, None, why) for (program, setting), why in failed.items()),
         ],
         refused=refused,
-        told={name: one.told for name, (one, _) in columns.items() if one.told},
+        told=_told(columns),
         cleaning=bench.cleaned(given.tour, given.gallery),
         checks=checks,
         sheets=sheets,
@@ -170,6 +171,12 @@ def _drawn(
             one = Contestant(method, "", (file,), None, room)
             columns[method] = one, bench.surface(one)
     return columns
+
+
+def _told(columns: dict[str, Column]) -> dict[str, str]:
+    """What methods say of their surface beyond that it was asked for."""
+    told = {name: one.told for name, (one, _) in columns.items()}
+    return {name: words for name, words in told.items() if words and AS_ASKED not in words}
 
 
 def _reliefs(
@@ -245,7 +252,7 @@ def _thinned(room: BenchRoom, given: argparse.Namespace) -> RoomResult:
         "so many `crust` can do.",
         columns={name: figures for name, (_, figures) in columns.items()},
         refused=refused,
-        told={name: one.told for name, (one, _) in columns.items() if one.told},
+        told=_told(columns),
         sheets=(_reliefs(THINNED, bench, columns, given),),
     )
 

@@ -68,6 +68,9 @@ def table(result: RoomResult) -> str:
         lines.append(f"| {key} | {cells} |")
     notes = [f"- `{method}` refuses: {why}." for method, why in result.refused.items()]
     notes += [f"- `{method}`: {told}." for method, told in result.told.items()]
+    if len(result.methods) > 1:
+        first = max(result.methods, key=lambda name: result.columns[name]["f_score_5mm"])
+        notes.append(f"- By F-score at 5 mm the best method is `{first}`.")
     return "\n".join([*lines, *([""] if notes else []), *notes, ""])
 
 

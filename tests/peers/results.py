@@ -9,7 +9,8 @@ from pathlib import Path
 
 from surface_score import Figures
 
-OURS = ("published", "auto")
+PUBLISHED = "published"
+OURS = (PUBLISHED, "auto")
 """Who has to beat the peers; the first that there is."""
 DUELS = ("f_score_5mm", "psnr_db")
 """Higher is better; a room is won by these."""
@@ -77,6 +78,14 @@ class RoomResult:
     def own(self) -> str:
         """Our column that is held against the peers."""
         return next(name for name in OURS if name in self.columns)
+
+    @property
+    def methods(self) -> list[str]:
+        """Our methods that drew a surface."""
+        others = (*self.settings, PUBLISHED)
+        return [
+            name for name, each in self.columns.items() if name not in others and DUELS[0] in each
+        ]
 
     @property
     def peers(self) -> dict[str, Figures]:

@@ -339,6 +339,8 @@ def result(mine: float, theirs: float) -> results.RoomResult:
         columns={
             "published": {"f_score_5mm": mine, "psnr_db": 29.0, "walls_rms_mm": 0.5},
             "oracle": {"psnr_db": 31.5},
+            "poisson": {"f_score_5mm": 0.7},
+            "signed-distance": {"f_score_5mm": 0.8},
             PEER: {"f_score_5mm": theirs, "psnr_db": 20.0, "walls_rms_mm": 0.7},
         },
         settings={PEER: "depth 9, cut 5 %"},
@@ -371,7 +373,8 @@ def test_the_report_shows_scores_refusals_and_pictures(tmp_path: Path) -> None:
     shown = dataclasses.replace(result(0.91, 0.9), sheets=(sheet,))
     report.write([shown], tmp_path / "sheets", tmp_path / "benchmarks.md")
     told = (tmp_path / "benchmarks.md").read_text(encoding="utf-8")
-    assert "| f_score_5mm | 0.9100 |  | 0.9000 |" in told
+    assert "| f_score_5mm | 0.9100 |  | 0.7000 | 0.8000 | 0.9000 |" in told
+    assert "the best method is `signed-distance`" in told
     assert "`crust` refuses: too many points." in told
     assert "| Open3D Poisson | depth 9, cut 5 % | 0.9000 |" in told
     assert "| Open3D Poisson | depth 10, cut 2 % | died (exit code 1) |" in told
