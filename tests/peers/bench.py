@@ -182,7 +182,9 @@ class Bench:
                 "psnr_db": float(np.mean(scored.psnr_db)),
                 "psnr_worst_db": min(scored.psnr_db),
                 "ssim": float(np.mean(scored.ssim)),
-                **seam_figures(truth, truth.cameras, views, shots, fitted_gain(views, shots)),
+                **seam_figures(
+                    truth, truth.cameras, views, shots, fitted_gain(views, shots), one.mesh
+                ),
             }
             if self.room.id in EDGES_MM:
                 camera, boards = plaque_view(self.room.id)

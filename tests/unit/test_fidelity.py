@@ -21,6 +21,7 @@ import pytest
 import report
 import results
 import score
+import seams
 import sections
 import surface_score
 import thinned
@@ -223,6 +224,30 @@ def test_a_gain_is_forgiven_and_noise_is_not() -> None:
     noisy = np.clip(true + rng.normal(0, 10, true.shape), 0, 255).astype(np.uint8)
     punished = picture_score.score_pictures([noisy], [shot(true)])
     assert punished.psnr_db[0] == pytest.approx(20 * np.log10(255 / 10), abs=0.3)
+
+
+def test_a_step_between_stations_is_a_seam_where_the_surface_stands_and_nowhere_else(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    camera = Camera(np.array([0.0, 0.0, 1.2]), np.array([2.0, 0.0, 1.2]))
+    width, height = seams.SIZE
+    cast = camera.rays(seams.SIZE)
+    hit = ray_scene(CORNERS, FACES).cast_rays(seams.tensor(cast))["t_hit"].numpy()
+    depth_m = hit.astype(np.float64) * np.linalg.norm(cast[..., 3:], axis=2)
+    true = np.full((height, width, 3), 120, np.uint8)
+    seen = Shot(true, np.ones((height, width), np.bool_), depth_m)
+    halves = np.where(np.arange(width) < width // 2, 1, 3)
+    monkeypatch.setattr(seams, "seen_by", lambda *_: np.tile(halves, (height, 1)))
+
+    def figures(step: int, vertices: np.ndarray) -> dict[str, float]:
+        shown = true.copy()
+        shown[:, width // 2 :] += np.uint8(step)
+        return seams.seam_figures(None, [camera], [shown], [seen], np.ones(3), (vertices, FACES))
+
+    assert figures(0, CORNERS)["seam_max"] == 0
+    found = figures(6, CORNERS)
+    assert (found["seams"], found["seam_max"], found["seam_view_max"]) == (1, 6, 6)
+    assert figures(6, CORNERS * (1.003, 1, 1))["seams"] == 0  # 6 mm behind the true wall
 
 
 def test_squares_are_read_in_a_true_view_and_not_in_a_blurred_one() -> None:
