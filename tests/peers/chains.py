@@ -27,7 +27,13 @@ GRID_M = 0.00025
 UV_BITS = 12
 FACES_SHARE = 1 / 3
 TEXTURE_PX = 2048
-STEPS = 7
+MOST_FACES = 200_000
+"""More would get less than 20 texels each."""
+FACE_BYTES = 5
+"""About what a face weighs, to begin with."""
+FULL_SHARE = 0.97
+"""So much of the bytes is as good as all."""
+TRIES = 8
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,7 @@ def vertex_chain(vertices: Float64, faces: Int32, room: BenchRoom, budget: int) 
         size = len(_draco(at, corners, colors=own))
         return Painted(at, corners, vertex_colored(own, corners), size)
 
-    return _largest(of_faces, 5_000, min(len(faces), 1_000_000), budget)
+    return _of_most_faces(of_faces, len(faces), budget)
 
 
 def texture_chain(vertices: Float64, faces: Int32, room: BenchRoom, budget: int) -> Painted:
@@ -76,7 +82,7 @@ def texture_chain(vertices: Float64, faces: Int32, room: BenchRoom, budget: int)
         size = len(_draco(at, corners, uv=uv))
         return Painted(at, corners, textured(uv, corners, np.zeros((1, 1, 3), np.uint8)), size)
 
-    bare = _largest(of_faces, 2_000, 200_000, int(budget * FACES_SHARE))
+    bare = _of_most_faces(of_faces, min(len(faces), MOST_FACES), int(budget * FACES_SHARE))
     at, corners, uv, texture = _unwrapped(vertices, faces, len(bare.faces), room)
 
     def of_quality(quality: int) -> Painted:
@@ -84,13 +90,29 @@ def texture_chain(vertices: Float64, faces: Int32, room: BenchRoom, budget: int)
         size = bare.size + len(packed)
         return Painted(at, corners, textured(uv, corners, _decoded(packed)), size)
 
-    return _largest(of_quality, 1, 100, budget)
+    return _of_best_quality(of_quality, budget)
 
 
-def _largest(make: Callable[[int], Painted], low: int, high: int, budget: int) -> Painted:
-    """What the largest number makes that fits, halving the range a few times."""
-    best = make(low)
-    for _ in range(STEPS):
+def _of_most_faces(make: Callable[[int], Painted], most: int, budget: int) -> Painted:
+    """What as many faces make as fit: bytes grow almost as faces do, so a few tries find them."""
+    best, count = None, min(most, budget // FACE_BYTES)
+    for _ in range(TRIES):
+        tried = make(count)
+        fits = tried.size <= budget
+        if fits and (best is None or tried.size > best.size):
+            best = tried
+        if best and (best.size > FULL_SHARE * budget or (fits and count == most)):
+            break
+        count = min(most, int(count * (1 + FULL_SHARE) / 2 * budget / tried.size))
+    if best is None:
+        raise RuntimeError(f"expected a mesh of {budget} bytes, found none")
+    return best
+
+
+def _of_best_quality(make: Callable[[int], Painted], budget: int) -> Painted:
+    """What the best quality of a picture makes that fits, 1 to 100; halves the range."""
+    best, low, high = make(1), 1, 101
+    while high - low > 1:
         middle = (low + high) // 2
         tried = make(middle)
         if tried.size <= budget:

@@ -65,6 +65,23 @@ def vertex_colored(colors: UInt8, faces: Int32) -> ColorsAt:
     return colors_at
 
 
+def relief(vertices: Float64, faces: Int32, eye: Float64) -> ColorsAt:
+    """Grey by the angle at which an eye looks at a face; red from behind."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-15)
+    ways = (eye - vertices).astype(np.float32)
+
+    def colors_at(face: Ints, share: Float32) -> UInt8:
+        way = blended(ways[faces[face]], share)
+        cosine = (normal[face] * way).sum(axis=1) / np.linalg.norm(way, axis=1)
+        shades = np.repeat((40 + 210 * np.abs(cosine))[:, None], 3, axis=1).astype(np.uint8)
+        shades[cosine < 0, 1:] //= 3
+        return shades
+
+    return colors_at
+
+
 def blended(corners: Float32, share: Float32) -> Float32:
     """(n, k) values of (n, 3, k) at the corners, blended."""
     mixed: Float32 = corners[:, 0] * (1 - share.sum(axis=1))[:, None]

@@ -2,184 +2,40 @@
 
 Each room of a simulated tour, and the gallery where it is given, is reconstructed by every
 method of tourgen and by other programs at three settings each, from the same points. All are
-held against the truth, as surfaces (``surface_score``, ``planes``) and as pictures
-(``picture_score``, ``seams``, ``plaque``). ``--write`` puts tables and pictures into the docs.
-What was made or measured before is kept in ``--scratch`` and not done again.
+held against the truth, as surfaces (``surface_score``, ``planes``, ``gaps``) and as pictures
+(``picture_score``, ``seams``, ``plaque``); what goes before, as cleaning, is judged too.
+``--write`` puts tables and pictures into the docs. What was made or measured before is kept in
+``--scratch`` and not done again; rooms that are not asked for are written as they were last
+judged.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import dataclass
-from functools import cached_property, partial
 from pathlib import Path
 
-import cleaning
 import contestants
-import numpy as np
 import oracle
 import report
-from browsing import photographed, published
-from contestants import CHAINS, PUBLISHED, Contestant
-from drawing import draw
-from gaps import Gaps
-from ledger import Ledger, digest
-from picture_score import fitted_gain, score_pictures
-from planes import Creases, Flatness, Rails, model_rods
-from plaque import EDGES_MM, plaque_view, read_board
+from aims import ORACLE, PANORAMAS, short_of
+from bench import Bench, reported_inferred
+from contestants import Contestant
+from results import PUBLISHED, RoomResult, Sheet, Try, save, saved
 from rooms import GALLERY, BenchRoom, demo_rooms, gallery
-from seams import seam_figures
-from surface_score import Figures, Reference, Samples, best, surface_figures
-from true_picture import TexturedTruth, true_shots
-from variants import built, gallery_tour
+from surface_score import Figures, best
+from thinned import POINTS, ROOM, thinned_room, thinned_tour
+from variants import alone, built, drawn, gallery_tour, link, scanned
 
-import tourgen
 from tourgen.geometry import UInt8
-from tourgen.simulation.light import ray_scene
+from tourgen.tour import Tour, load_tour
 
-VERSION = 2
-"""Raised when a measure changes, so that nothing is taken from earlier runs."""
+THINNED = f"{ROOM}-thinned"
+COLORED_BY_PANORAMAS = ("chamber1",)
+"""Rooms that are published once more, from their E57."""
+AS_ASKED = "as asked for"
 
-
-@dataclass(frozen=True)
-class Bench:
-    """Measures contestants of one room.
-
-    Attributes:
-        room: The room.
-        scratch: Where meshes, pictures and figures are kept.
-    """
-
-    room: BenchRoom
-    scratch: Path
-
-    @property
-    def ledger(self) -> Ledger:
-        """Of this room and this version of the measures."""
-        return Ledger(self.scratch / f"v{VERSION}" / self.room.id)
-
-    @cached_property
-    def reference(self) -> Reference:
-        """The truth and its seen points."""
-        return Reference.of(self.room.truth())
-
-    @cached_property
-    def flatness(self) -> Flatness:
-        """Its planes."""
-        return Flatness(self.reference.truth)
-
-    @cached_property
-    def creases(self) -> Creases:
-        """Where they meet."""
-        return Creases(self.reference.truth)
-
-    @cached_property
-    def gaps(self) -> Gaps:
-        """Where nobody measured, and where nothing is."""
-        return Gaps.of(self.room, self.reference.truth)
-
-    @cached_property
-    def rails(self) -> Rails:
-        """Its rods."""
-        truth = self.reference.truth
-        return Rails(truth, model_rods(self.room.id, truth))
-
-    @cached_property
-    def textured(self) -> TexturedTruth:
-        """The truth with its colours."""
-        return TexturedTruth(self.room)
-
-    def surface(self, one: Contestant) -> Figures:
-        """What a contestant's surface is worth."""
-
-        def measure() -> Figures:
-            vertices, faces = one.mesh
-            samples = Samples.of(vertices, faces, self.reference.truth)
-            return {
-                **surface_figures(vertices, faces, samples, self.reference),
-                **self.flatness.figures(samples),
-                **self.creases.figures(vertices, faces),
-                **self.rails.figures(vertices, faces),
-            }
-
-        def gaps() -> Figures:
-            return self.gaps.figures(*one.mesh)
-
-        name = digest(one.files)
-        return {
-            **self.ledger.figures(f"surface-{name}", measure),
-            **self.ledger.figures(f"gaps-{name}", gaps),
-        }
-
-    def pictures(self, one: Contestant, budget: int) -> list[UInt8]:
-        """What the room's cameras see of a contestant, and the plaque's after them.
-
-        Args:
-            one: Published, or a peer's mesh.
-            budget: Bytes that a peer's whole chain may take.
-        """
-        cameras = list(self.textured.cameras)
-        if self.room.id in EDGES_MM:
-            cameras.append(plaque_view(self.room.id)[0])
-
-        def take() -> list[UInt8]:
-            if one.site is not None:
-                with published(one.site) as here:
-                    return photographed(here, self.room.id, cameras)
-            chain = CHAINS[one.name](*one.mesh, self.room, budget)
-            scene = ray_scene(chain.vertices, chain.faces)
-            return [draw(scene, chain.colors_at, camera) for camera in cameras]
-
-        weight = "" if one.site else f"-{budget // 1000}"
-        return self.ledger.pictures(f"{digest(one.files)}{weight}", take)
-
-    def picture(self, one: Contestant, budget: int) -> Figures:
-        """How near its pictures come to the true ones."""
-
-        def measure() -> Figures:
-            truth = self.textured
-            shots = true_shots(self.room, truth, self.scratch)
-            pictures = self.pictures(one, budget)
-            views = pictures[: len(shots)]
-            scored = score_pictures(views, shots)
-            figures = {
-                "psnr_db": float(np.mean(scored.psnr_db)),
-                "psnr_worst_db": min(scored.psnr_db),
-                "ssim": float(np.mean(scored.ssim)),
-                **seam_figures(
-                    truth, truth.cameras, views, shots, fitted_gain(views, shots), one.mesh
-                ),
-            }
-            if self.room.id in EDGES_MM:
-                camera, boards = plaque_view(self.room.id)
-                true = draw(truth.scene, truth.colors_at, camera)
-                for board in boards:
-                    reading = read_board(pictures[-1], true, camera, board)
-                    figures[f"squares_{board.edge_mm}mm_right"] = reading.right
-                    figures[f"squares_{board.edge_mm}mm_contrast"] = reading.contrast
-            return figures
-
-        weight = "" if one.site else f"-{budget // 1000}"
-        return self.ledger.figures(f"picture-{digest(one.files)}{weight}", measure)
-
-
-def cleaned(room: str, given: argparse.Namespace, ledger: Ledger) -> dict[str, Figures]:
-    """What cleaning leaves of a room's faults, by the format of the scan."""
-    stages = sorted((Path(tourgen.__file__).parent / "stages").rglob("*.py"))
-
-    def measure(kind: str) -> Figures:
-        if room == GALLERY:
-            case = cleaning.gallery(given.gallery)
-        else:
-            case = cleaning.modelled(given.tour, room, kind)
-        return cleaning.figures(case, cleaning.cleaned(case)[0])
-
-    kinds = ("e57",) if room == GALLERY else ("e57", "ply")
-    code = digest([Path(cleaning.__file__), *stages])
-    return {
-        kind: ledger.figures(f"cleaning-{kind}-{code}", partial(measure, kind)) for kind in kinds
-    }
+Column = tuple[Contestant, Figures]
 
 
 def main() -> int:
@@ -189,14 +45,22 @@ def main() -> int:
     if given.gallery and given.gallery.exists():
         shown = gallery(given.gallery, given.scratch)
         rooms[shown.id] = shown
-    chosen = given.room or list(rooms)
-    results = []
-    for room in chosen:
-        results.append(_judged(rooms[room], given))
-        print(report.table(results[-1]), flush=True)
-    if given.write:
-        report.write(results, given.write)
-    return 0 if all(each.won for each in results) else 1
+    every = [*rooms, *([THINNED] if ROOM in rooms else [])]
+    results = {}
+    for name in given.room or every:
+        if name == THINNED:
+            results[name] = _thinned(rooms[ROOM], given)
+        else:
+            results[name] = _judged(rooms[name], given)
+        print(report.table(results[name]), flush=True)
+        if not _is_partial(given):
+            save(results[name], _kept(given, name))
+    _write(results, every, given)
+    for line in short_of(list(results.values())):
+        print(f"falls short: {line}")
+    lost = [line for each in results.values() for line in each.lost]
+    print("\n".join(f"lost: {line}" for line in lost) or "every room is won")
+    return 1 if lost else 0
 
 
 def _asked() -> argparse.Namespace:
@@ -209,55 +73,187 @@ def _asked() -> argparse.Namespace:
     parser.add_argument("--skip-peers", action="store_true")
     parser.add_argument("--skip-picture", action="store_true")
     parser.add_argument("--write", type=Path, help="write the section of this Markdown file")
-    return parser.parse_args()
+    given = parser.parse_args()
+    given.scratch = given.scratch.resolve()
+    return given
 
 
-def _judged(room: BenchRoom, given: argparse.Namespace) -> report.RoomResult:
+def _is_partial(given: argparse.Namespace) -> bool:
+    """Whether rooms are not judged whole."""
+    return bool(given.method or given.skip_peers or given.skip_picture)
+
+
+def _kept(given: argparse.Namespace, room: str) -> Path:
+    """Where a room's result is kept for runs that leave it out."""
+    file: Path = given.scratch / "results" / f"{room}.json"
+    return file
+
+
+def _write(results: dict[str, RoomResult], every: list[str], given: argparse.Namespace) -> None:
+    """Write the docs, with the other rooms as they were last judged, or say why not."""
+    others = [name for name in every if name not in results]
+    never = [name for name in others if not _kept(given, name).exists()]
+    if not given.write or _is_partial(given) or never:
+        why = (
+            "not asked to (--write)"
+            if not given.write
+            else "not all contestants were judged"
+            if _is_partial(given)
+            else f"never judged here: {', '.join(never)}"
+        )
+        print(f"writes no docs: {why}", flush=True)
+        return
+    whole = results | {name: saved(_kept(given, name)) for name in others}
+    report.write([whole[name] for name in every], _sheets(given), given.write)
+    print(
+        f"wrote {given.write}"
+        + (f", as they were last judged: {', '.join(others)}" if others else ""),
+        flush=True,
+    )
+
+
+def _sheets(given: argparse.Namespace) -> Path:
+    """Where pictures side by side are kept."""
+    folder: Path = given.scratch / "sheets"
+    return folder
+
+
+def _judged(room: BenchRoom, given: argparse.Namespace) -> RoomResult:
     """One room: all contestants, their figures, the best of each peer's settings."""
     bench = Bench(room, given.scratch)
-    is_demo = (given.tour / "site" / "rooms" / room.id).exists()
-    tour = given.tour if is_demo else gallery_tour(given.gallery, given.scratch)
-    columns: dict[str, tuple[Contestant, Figures]] = {}
+    is_demo = room.id != GALLERY
+    tour = load_tour(given.tour) if is_demo else gallery_tour(given.gallery, given.scratch)
+    columns: dict[str, Column] = {}
     refused: dict[str, str] = {}
     if is_demo:
-        one = contestants.ours(PUBLISHED, given.tour / "site", room.id)
+        one = contestants.published(PUBLISHED, given.tour / "site", room.id)
         columns[PUBLISHED] = one, bench.surface(one)
-    for method in given.method or contestants.methods():
-        print(f"{room.id}: {method} ...", flush=True)
-        site = built(tour, method, room.id, given.scratch)
-        if isinstance(site, str):
-            refused[method] = site
-            continue
-        one = contestants.ours(method, site, room.id)
-        columns[method] = one, bench.surface(one)
-    rows = [
-        (one, bench.surface(one))
-        for one in ([] if given.skip_peers else contestants.peers(room, given.scratch))
-    ]
+    columns |= _drawn(tour, bench, given.method or contestants.methods(), refused)
+    found, failed = ([], {}) if given.skip_peers else contestants.peers(room, given.scratch)
+    rows = [(one, bench.surface(one)) for one in found]
     for program in dict.fromkeys(one.name for one, _ in rows):
         columns[program] = best([row for row in rows if row[0].name == program])
-    pictures: dict[str, list[UInt8]] = {}
-    if is_demo and not given.skip_picture:
-        site = oracle.built_oracle(tour, room, bench.textured, given.scratch)
-        if isinstance(site, str):
-            refused[oracle.NAME] = site
+    checks = bench.registered(given.tour, given.gallery)
+    sheets = [_reliefs(room.id, bench, columns, given)]
+    if is_demo:
+        inferred = reported_inferred(given.tour / "site", room.id)
+        checks |= {"inferred_reported": inferred, **bench.oriented(given.tour)}
+        if not given.skip_picture:
+            sheets += _pictured(tour, bench, columns, refused, given)
+    return RoomResult(
+        room=room.id,
+        columns={name: figures for name, (_, figures) in columns.items()},
+        settings={name: one.setting for name, (one, _) in columns.items() if one.setting},
+        tries=[
+            *(Try(one.name, one.setting, each["f_score_5mm"]) for one, each in rows),
+            *(Try(program, setting, None, why) for (program, setting), why in failed.items()),
+        ],
+        refused=refused,
+        told=_told(columns),
+        cleaning=bench.cleaned(given.tour, given.gallery),
+        checks=checks,
+        sheets=sheets,
+    )
+
+
+def _drawn(
+    tour: Tour, bench: Bench, methods: tuple[str, ...], refused: dict[str, str]
+) -> dict[str, Column]:
+    """A room by each method; those that refuse are noted."""
+    columns: dict[str, Column] = {}
+    room = bench.room.id
+    for method in methods:
+        print(f"{room}: {method} ...", flush=True)
+        file = drawn(tour, room, method, bench.scratch)
+        if isinstance(file, str):
+            refused[method] = file
         else:
-            columns[oracle.NAME] = contestants.ours(oracle.NAME, site, room.id), {}
-        budget = contestants.tiles_bytes(given.tour / "site", room.id)
-        for name, (one, figures) in columns.items():
-            print(f"{room.id}: pictures of {name} ...", flush=True)
-            columns[name] = one, figures | bench.picture(one, budget)
-            pictures[name] = bench.pictures(one, budget)
-        shots = true_shots(room, bench.textured, given.scratch)
-        pictures["truth"] = [shot.picture for shot in shots]
-    return report.RoomResult(
-        room.id,
-        {name: figures for name, (_, figures) in columns.items()},
-        {name: one.setting for name, (one, _) in columns.items() if one.setting},
-        [(one.name, one.setting, figures) for one, figures in rows],
-        refused,
-        cleaned(room.id, given, bench.ledger),
-        pictures,
+            one = Contestant(method, "", (file,), None, room)
+            columns[method] = one, bench.surface(one)
+    return columns
+
+
+def _told(columns: dict[str, Column]) -> dict[str, str]:
+    """What methods say of their surface beyond that it was asked for."""
+    told = {name: one.told for name, (one, _) in columns.items()}
+    return {name: words for name, words in told.items() if words and AS_ASKED not in words}
+
+
+def _reliefs(
+    name: str, bench: Bench, columns: dict[str, Column], given: argparse.Namespace
+) -> Sheet:
+    """The bare surfaces side by side."""
+    shown = {"truth": bench.relief(None)}
+    shown |= {each: bench.relief(one) for each, (one, _) in columns.items()}
+    return report.side_by_side(shown, _sheets(given) / f"fidelity-{name}-relief.webp")
+
+
+def _pictured(
+    tour: Tour,
+    bench: Bench,
+    columns: dict[str, Column],
+    refused: dict[str, str],
+    given: argparse.Namespace,
+) -> list[Sheet]:
+    """Add the figures of pictures to the columns that have colours; the sheets of all."""
+    room = bench.room.id
+    for name, site in _published_beside(tour, bench, given).items():
+        if isinstance(site, str):
+            refused[name] = site
+        else:
+            columns[name] = contestants.published(name, site, room), {}
+    budget = contestants.tiles_bytes(given.tour / "site", room)
+    shown: dict[str, list[UInt8]] = {}
+    for name, (one, figures) in columns.items():
+        if one.site is None and not one.setting:
+            continue
+        print(f"{room}: pictures of {name} ...", flush=True)
+        columns[name] = one, figures | bench.picture(one, budget)
+        shown[name] = bench.pictures(one, budget)
+    shown = {"truth": bench.true_pictures(), **shown}
+    numbers = [
+        *bench.busiest[: report.SHOWN_CAMERAS],
+        *range(len(bench.shots), len(shown["truth"])),
+    ]
+    return [
+        report.side_by_side(
+            {name: pictures[number] for name, pictures in shown.items()},
+            _sheets(given) / f"fidelity-{room}-{number}.webp",
+        )
+        for number in numbers
+    ]
+
+
+def _published_beside(tour: Tour, bench: Bench, given: argparse.Namespace) -> dict[str, Path | str]:
+    """The sites that are built for their pictures alone."""
+    room = bench.room.id
+    print(f"{room}: {ORACLE} ...", flush=True)
+    sites = {ORACLE: oracle.built_oracle(tour, bench.room, bench.textured, given.scratch)}
+    if room in COLORED_BY_PANORAMAS:
+        print(f"{room}: {PANORAMAS} ...", flush=True)
+        folder = given.scratch / PANORAMAS / room
+        folder.mkdir(parents=True, exist_ok=True)
+        link(folder / "scans", given.tour / "scans")
+        scan = scanned(tour, room, f"scans/{room}.e57")
+        sites[PANORAMAS] = built(alone(tour, room, folder, **scan))
+    return sites
+
+
+def _thinned(room: BenchRoom, given: argparse.Namespace) -> RoomResult:
+    """A room by every method from so few points that crust can do it."""
+    few = thinned_room(room, given.scratch)
+    bench = Bench(few, given.scratch)
+    refused: dict[str, str] = {}
+    tour = thinned_tour(load_tour(given.tour), few, given.scratch)
+    columns = _drawn(tour, bench, given.method or contestants.methods(), refused)
+    return RoomResult(
+        room=THINNED,
+        about=f"`{room.id}` thinned to {POINTS:,} points, the middlemost of each cell of a grid: "
+        "so many `crust` can do.",
+        columns={name: figures for name, (_, figures) in columns.items()},
+        refused=refused,
+        told=_told(columns),
+        sheets=(_reliefs(THINNED, bench, columns, given),),
     )
 
 

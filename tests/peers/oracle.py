@@ -8,28 +8,28 @@ pipeline's own.
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
 import numpy as np
 from drawing import blended, tensor
-from rooms import BenchRoom, read_scan
+from rooms import BenchRoom, read_scan, stamp
 from true_picture import TexturedTruth
-from variants import built
+from variants import alone, built, scanned
 
 from tourgen.simulation.atlas import sample
 from tourgen.simulation.output import write_ply
+from tourgen.tour import Tour
 
 SURFACE = 0
 NAME = "oracle"
 
 
-def oracle_tour(tour: Path, room: BenchRoom, truth: TexturedTruth, scratch: Path) -> Path:
-    """A tour's folder with one room, its clean scan and its true mesh."""
+def oracle_tour(tour: Tour, room: BenchRoom, truth: TexturedTruth, scratch: Path) -> Tour:
+    """One room with its clean scan, true mesh and true stations, without boxes."""
     import open3d as o3d
 
     folder = scratch / NAME / room.id
-    cloud = folder / "scans" / "clean.ply"
+    cloud = folder / "scans" / f"clean-{stamp(room.scan)}.ply"
     if not cloud.exists():
         cloud.parent.mkdir(parents=True, exist_ok=True)
         write_clean(cloud, room, truth)
@@ -39,9 +39,17 @@ def oracle_tour(tour: Path, room: BenchRoom, truth: TexturedTruth, scratch: Path
         mesh.remove_duplicated_vertices()
         mesh.remove_degenerate_triangles()
         o3d.io.write_triangle_mesh(str(folder / "scans" / "true.ply"), mesh)
-    told = (tour / "tour.toml").read_text(encoding="utf-8")
-    (folder / "tour.toml").write_text(_clean(told, room), encoding="utf-8")
-    return folder
+    return alone(
+        tour,
+        room.id,
+        folder,
+        mesh="scans/true.ply",
+        stations=tuple(map(tuple, np.round(room.stations(), 4).tolist())),
+        keep=None,
+        remove=(),
+        closed=(),
+        **scanned(tour, room.id, f"scans/{cloud.name}"),
+    )
 
 
 def write_clean(file: Path, room: BenchRoom, truth: TexturedTruth) -> None:
@@ -54,18 +62,6 @@ def write_clean(file: Path, room: BenchRoom, truth: TexturedTruth) -> None:
     write_ply(file, nearest["points"].numpy(), sample(truth.texture, at))
 
 
-def _clean(told: str, room: BenchRoom) -> str:
-    """tour.toml of one room: clean scan, true mesh, true stations, no boxes, its own texture."""
-    (asked,) = (each for each in tomllib.loads(told)["room"] if each["id"] == room.id)
-    texture = ", ".join(f"{key} = {value}" for key, value in asked.get("texture", {}).items())
-    return (
-        f'[tour]\ntitle = {{ en = "Oracle" }}\nlanguages = ["en"]\nstart = "{room.id}"\n\n'
-        f'[[room]]\nid = "{room.id}"\ntitle = {{ en = "Oracle" }}\n'
-        'scans = ["scans/clean.ply"]\nmesh = "scans/true.ply"\n'
-        f"stations = {np.round(room.stations(), 4).tolist()}\ntexture = {{ {texture} }}\n"
-    )
-
-
-def built_oracle(tour: Path, room: BenchRoom, truth: TexturedTruth, scratch: Path) -> Path | str:
+def built_oracle(tour: Tour, room: BenchRoom, truth: TexturedTruth, scratch: Path) -> Path | str:
     """The oracle's site; why not, where it cannot be built."""
-    return built(oracle_tour(tour, room, truth, scratch), NAME, room.id, scratch, method="")
+    return built(oracle_tour(tour, room, truth, scratch))

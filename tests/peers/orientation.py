@@ -112,22 +112,33 @@ def prepared(room: Room, folder: Path) -> tuple[PointCloud, Float32]:
 
 def figures(points: Float32, found: Float32, truth: Truth) -> dict[str, float]:
     """Hold (n, 3) normals against the truth."""
-    away, nearest = map(np.asarray, cKDTree(truth.points).query(points, workers=-1))
-    mine = np.flatnonzero(away < 0.01)
-    cosine = np.einsum("ij,ij->i", found[mine], truth.normals[nearest[mine]])
-    out = {"right": float((cosine > 0).mean())}
+    mine, true = _matched(points, truth)
+    cosine = np.einsum("ij,ij->i", found[mine], true)
     chosen = np.random.default_rng(0).permutation(len(mine))[:SAMPLE]
-    at, true = points[mine[chosen]], truth.normals[nearest[mine[chosen]]]
     error = np.degrees(np.arccos(np.clip(np.abs(cosine[chosen]), 0, 1)))
-    flat, crease_mm = _creases(at, true, truth)
+    flat, crease_mm = _creases(points[mine[chosen]], true[chosen], truth)
     groups = {"flat": flat} | {
         f"crease {low}-{high}": (crease_mm >= low) & (crease_mm < high) for low, high in BANDS_MM
     }
+    out = {}
     for name, group in groups.items():
         out[f"{name} median_deg"] = float(np.median(error[group]))
         out[f"{name} p95_deg"] = float(np.quantile(error[group], 0.95))
     out["flat rms_deg"] = float(np.sqrt((error[flat] ** 2).mean()))
     return out
+
+
+def right(points: Float32, found: Float32, truth: Truth) -> float:
+    """The share of (n, 3) normals that look into the open."""
+    mine, true = _matched(points, truth)
+    return float((np.einsum("ij,ij->i", found[mine], true) > 0).mean())
+
+
+def _matched(points: Float32, truth: Truth) -> tuple[NDArray[np.int64], Float32]:
+    """Which points the truth knows, and their true normals."""
+    away, nearest = map(np.asarray, cKDTree(truth.points).query(points, workers=-1))
+    mine = np.flatnonzero(away < 0.01)
+    return mine, truth.normals[nearest[mine]]
 
 
 def _creases(points: Float32, true: Float32, truth: Truth) -> tuple[Bools, Float64]:
@@ -150,6 +161,47 @@ def _creases(points: Float32, true: Float32, truth: Truth) -> tuple[Bools, Float
     return flat, crease * 1000
 
 
+@dataclass(frozen=True, slots=True)
+class Oriented:
+    """What comes of one room.
+
+    Attributes:
+        points: (n, 3) thinned.
+        normals: (n, 3) theirs.
+        truth: To hold them against.
+        facts: How many points and stations, and what they took.
+    """
+
+    points: Float32
+    normals: Float32
+    truth: Truth
+    facts: dict[str, float]
+
+
+def oriented(folder: Path, room: Room, *, given: bool) -> Oriented:
+    """Normals of one room of a tour, without stations or with the true ones."""
+    truth = truth_of(folder, room.id)
+    cloud, full = prepared(room, folder)
+    spent = time.process_time
+    start = spent()
+    tangent_planes(cloud.points, SETTINGS.first_neighbours, SETTINGS.neighbours)
+    planes_s = spent() - start
+    stood = truth.stations if given else stations.find_stations(full, stations.Settings())
+    found_s = spent() - start - planes_s
+    turned = normals.normals(cloud, stood, SETTINGS)
+    turned_s = spent() - start - 2 * planes_s
+    million = len(cloud) / 1e6
+    facts = {
+        "points": float(len(cloud)),
+        "stations": float(len(stood)),
+        "stations seconds": found_s,
+        "planes seconds a million": planes_s / million,
+        "turning seconds a million": turned_s / million,
+        "right": right(cloud.points, turned.normals, truth),
+    }
+    return Oriented(cloud.points, turned.normals, truth, facts)
+
+
 def main() -> int:
     """The command; 1 where a room misses its goals."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -161,24 +213,8 @@ def main() -> int:
     for room in load_tour(given.tour).rooms:
         if given.room and room.id not in given.room:
             continue
-        truth = truth_of(given.tour, room.id)
-        cloud, full = prepared(room, given.tour)
-        spent = time.process_time
-        start = spent()
-        tangent_planes(cloud.points, SETTINGS.first_neighbours, SETTINGS.neighbours)
-        planes_s = spent() - start
-        stood = truth.stations if given.given else stations.find_stations(full, stations.Settings())
-        found_s = spent() - start - planes_s
-        oriented = normals.normals(cloud, stood, SETTINGS)
-        turned_s = spent() - start - 2 * planes_s
-        million = len(cloud) / 1e6
-        facts = {
-            "points": float(len(cloud)),
-            "stations": float(len(stood)),
-            "stations seconds": found_s,
-            "planes seconds a million": planes_s / million,
-            "turning seconds a million": turned_s / million,
-        } | figures(cloud.points, oriented.normals, truth)
+        done = oriented(given.tour, room, given=given.given)
+        facts = done.facts | figures(done.points, done.normals, done.truth)
         print(room.id, *(f"  {name:24} {value:12.4f}" for name, value in facts.items()), sep="\n")
         reached &= facts["right"] >= GOAL_RIGHT
         reached &= facts["turning seconds a million"] <= GOAL_SECONDS_A_MILLION

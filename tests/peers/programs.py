@@ -1,19 +1,19 @@
 """The peers: what other programs make of the same scan, each by its own documented recipe.
 
-Every peer gets the scan that tourgen gets, cropped to the same boxes of tour.toml. Each then
-drops outliers with its own filter and finds normals with its own; the normals are turned towards
-the nearest true station, which is more than a merged scan tells and than either program can do
-by itself. Poisson's invented surface is cut by density, as Open3D's manual shows: by 1 % of the
+Every peer gets the scan that tourgen gets, cropped to the same boxes of tour.toml and, as one
+would by hand, to the room: strays tens of metres behind a window make the cells of an octree as
+coarse (chamber1, PyMeshLab, depth 9: 22,808 vertices of a surface 36 m wide). Each then drops
+outliers with its own filter and finds normals with its own; the normals are turned towards the
+nearest true station, which is more than a merged scan tells and than either program can do by
+itself. Poisson's invented surface is cut by density, as Open3D's manual shows: by 1 % of the
 vertices as there, and by what suits the peers better (chamber1, Open3D, F-score at 5 mm: depth 9,
 0 % 0.855, 1 % 0.877, 2 % 0.885, 5 % 0.890, 10 % 0.875, 20 % 0.829; depth 10, 5 % 0.883, which
-cuts too much there: recall 0.806). A peer's score in a
-room is that of the best of its settings there.
+cuts too much there: recall 0.806). A peer's score in a room is that of the best of its settings
+there.
 """
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,12 +21,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rooms import BenchRoom
+from apart import apart
+from rooms import BenchRoom, stamp
 
 from tourgen.geometry import Float32, Float64, Int32
 
-VERSION = 1
+VERSION = 2
 """Raised when a recipe changes, so that cached meshes are made again."""
+LIMIT_S = 3600
+"""A peer that takes more of the processor is stopped, and the table says so."""
 
 Mesh = tuple[Float64, Int32]
 
@@ -117,7 +120,10 @@ class MeshlabBallPivoting:
     radii_mm: tuple[float, ...]
 
     def __call__(self, points: Float32, stations: Float64) -> Mesh:
-        """Outliers by local probability (32 neighbours, 0.8), normals of 16, thinning, balls."""
+        """Outliers by local probability (32 neighbours, 0.8), normals of 16, thinning, balls.
+
+        Whole parts come out inside out: faces are turned to the stations, as normals were before.
+        """
         import pymeshlab
 
         meshes = _meshlab_cloud(points, stations)
@@ -128,7 +134,8 @@ class MeshlabBallPivoting:
             meshes.generate_surface_reconstruction_ball_pivoting(
                 ballradius=pymeshlab.PureValue(radius_mm / 1000)
             )
-        return _of_meshlab(meshes)
+        vertices, faces = _of_meshlab(meshes)
+        return vertices, facing_stations(vertices, faces, stations)
 
 
 def _meshlab_cloud(points: Float32, stations: Float64) -> Any:
@@ -163,6 +170,15 @@ def toward_stations(points: Float64, normals: Float64, stations: Float64) -> Flo
     return turned
 
 
+def facing_stations(vertices: Float64, faces: Int32, stations: Float64) -> Int32:
+    """The faces, each turned towards the station nearest to it."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    away = (toward_stations((a + b + c) / 3, normals, stations) * normals).sum(axis=1) < 0
+    turned: Int32 = np.where(away[:, None], faces[:, ::-1], faces)
+    return turned
+
+
 OPEN3D_POISSON, MESHLAB_POISSON = "Open3D Poisson", "PyMeshLab Poisson"
 MESHLAB_BALLS = "PyMeshLab ball pivoting"
 
@@ -179,30 +195,30 @@ ATTEMPTS = (
 )
 
 
-def made(attempt: Attempt, room: BenchRoom, scratch: Path) -> Path:
-    """The mesh of one attempt, made in a process of its own unless it is there.
+def made(attempt: Attempt, room: BenchRoom, scratch: Path) -> Path | str:
+    """The mesh of one attempt, made in a process of its own unless it is there; why there is none.
+
+    What failed is not tried again: the reason lies beside, as ``.txt``.
 
     Returns:
         An ``.npz`` with ``vertices``, ``faces`` and ``seconds``.
     """
-    digest = f"{room.scan.stat().st_size}-{room.scan.stat().st_mtime_ns}"
-    name = f"{attempt.file_name}-v{VERSION}-{digest}.npz"
+    name = f"{attempt.file_name}-v{VERSION}-{stamp(room.scan)}.npz"
     file = scratch / "peers" / room.id / name
+    why = file.with_suffix(".txt")
+    if why.exists():
+        return why.read_text(encoding="utf-8")
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
-        # Idle threads that spin make a busy machine six times as slow.
-        os.environ["OMP_WAIT_POLICY"] = "passive"
-        spawn = multiprocessing.get_context("spawn")
-        worker = spawn.Process(target=_make, args=(attempt, room, file))
-        worker.start()
-        worker.join()
-        if worker.exitcode:
-            raise RuntimeError(f"{attempt.program} ({attempt.setting}) died on {room.id}")
+        failed = apart(_make, attempt, room, file, limit_s=LIMIT_S)
+        if failed:
+            why.write_text(failed, encoding="utf-8")
+            return failed
     return file
 
 
 def _make(attempt: Attempt, room: BenchRoom, file: Path) -> None:
-    points, _ = room.cloud()
+    points = room.cropped()
     begun = time.perf_counter()
     vertices, faces = attempt.make(points, room.stations())
     seconds = time.perf_counter() - begun

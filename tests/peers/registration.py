@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 from tourgen.geometry import Float64, PointCloud
 from tourgen.scans import open_scan, read_room
 from tourgen.stages import register
-from tourgen.tour import load_tour
+from tourgen.tour import Room, load_tour
 
 GOAL_MM, GOAL_DEG = 2.0, 0.05
 MOVED_M, TURNED_DEG = 0.05, 1.0
@@ -106,26 +106,72 @@ def displaced(cloud: PointCloud, stations: Float64) -> tuple[PointCloud, Float64
     return PointCloud(cloud.origin, points, cloud.colors, cloud.station), places, moves
 
 
-def figures(name: str, cloud: PointCloud, given: Float64, true: Poses, stations: Float64) -> bool:
+@dataclass(frozen=True, slots=True)
+class Case:
+    """The stations of one scan and their truth.
+
+    Attributes:
+        name: Of the room.
+        cloud: As read.
+        given: (s, 3) where the scan puts its stations, metres.
+        true: From there to where they are.
+        stations: (s, 3) where they are.
+    """
+
+    name: str
+    cloud: PointCloud
+    given: Float64
+    true: Poses
+    stations: Float64
+
+
+def modelled(tour: Path, room: Room) -> Case:
+    """A room of the demo."""
+    cloud, given, _ = read_room((open_scan(tour / "scans" / f"{room.id}.e57"),), room.keep)
+    return Case(room.id, cloud, given, *true_motions(tour / "truth" / f"{room.id}.json"))
+
+
+def exact(scan: Path) -> Case:
+    """A scan whose poses are the truth."""
+    cloud, given, _ = read_room((open_scan(scan),))
+    return Case("gallery", cloud, given, Poses.still(len(given)), given)
+
+
+def figures(case: Case, move: bool) -> dict[str, float]:
+    """What comes of a case as it is, or after one station was moved, before and after."""
+    still = Poses.still(len(case.given))
+    points, places, moves = (
+        displaced(case.cloud, case.given) if move else (case.cloud, case.given, still)
+    )
+    begun = time.perf_counter()
+    made = register.register(points, places, register.Settings())
+    found = {"seconds": time.perf_counter() - begun}
+    after = Poses(made.rotations, made.translations)
+    for when, poses in (("before", still), ("after", after)):
+        gap, twist = apart(poses, case.true.after(moves.back()), case.stations)
+        found |= {
+            f"{when} largest mm": float(gap.max()),
+            f"{when} mean mm": float(gap.mean()),
+            f"{when} largest deg": float(twist.max()),
+            f"{when} mean deg": float(twist.mean()),
+        }
+    return found
+
+
+def told(case: Case) -> bool:
     """Print what comes of one scan, as given and displaced; whether the goals are met."""
     reached = True
-    for words, (points, places, moves) in (
-        ("as given", (cloud, given, Poses.still(len(given)))),
-        ("displaced", displaced(cloud, given)),
-    ):
-        aim = true.after(moves.back())
-        begun = time.perf_counter()
-        made = register.register(points, places, register.Settings())
-        seconds = time.perf_counter() - begun
-        print(f"{name}, {words}: {len(points):,} points, {seconds:.1f} s")
-        after = Poses(made.rotations, made.translations)
-        for when, poses in (("before", Poses.still(len(given))), ("after", after)):
-            gap, twist = apart(poses, aim, stations)
+    for words, move in (("as given", False), ("displaced", True)):
+        found = figures(case, move)
+        print(f"{case.name}, {words}: {len(case.cloud):,} points, {found['seconds']:.1f} s")
+        for when in ("before", "after"):
             print(
-                f"  {when:7} {gap.max():8.3f} mm largest {gap.mean():8.3f} mean"
-                f" {twist.max():8.4f} deg largest {twist.mean():8.4f} mean"
+                f"  {when:7} {found[f'{when} largest mm']:8.3f} mm largest"
+                f" {found[f'{when} mean mm']:8.3f} mean"
+                f" {found[f'{when} largest deg']:8.4f} deg largest"
+                f" {found[f'{when} mean deg']:8.4f} mean"
             )
-        reached &= bool(gap.max() <= GOAL_MM and twist.max() <= GOAL_DEG)
+        reached &= found["after largest mm"] <= GOAL_MM and found["after largest deg"] <= GOAL_DEG
     return reached
 
 
@@ -140,13 +186,9 @@ def main() -> int:
     for room in load_tour(asked.tour).rooms:
         if asked.room and room.id not in asked.room:
             continue
-        scan = open_scan(asked.tour / "scans" / f"{room.id}.e57")
-        cloud, given, _ = read_room((scan,), room.keep)
-        true, stations = true_motions(asked.tour / "truth" / f"{room.id}.json")
-        reached &= figures(room.id, cloud, given, true, stations)
+        reached &= told(modelled(asked.tour, room))
     if asked.gallery:
-        cloud, given, _ = read_room((open_scan(asked.gallery),))
-        reached &= figures("gallery", cloud, given, Poses.still(len(given)), given)
+        reached &= told(exact(asked.gallery))
     return 0 if reached else 1
 
 

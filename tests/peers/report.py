@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from aims import aims_table
 from programs import ATTEMPTS
+from results import RoomResult, Sheet
 from sections import rewrite
-from surface_score import Figures
 
 from tourgen.geometry import UInt8
 
 HEADING = "Fidelity"
-OURS = ("auto", "published")
-"""Who has to beat the peers; the first that there is."""
-SHOWN_CAMERAS = (0, 7)
+SHOWN_CAMERAS = 2
+"""So many, those that see most."""
 SHOWN_SIZE = (640, 360)
+ASIDE = 2
+"""Pictures in a row."""
 QUALITY = 70
 PREAMBLE = """Made by `make bench-fidelity` from the demo, and from the gallery where it is at hand.
 Every column is one surface of the same scan: `published` is the tour's site as it stands, then
-follow the methods of `room.surface.method`, each built with this tour.toml, and the best of three
-settings of each peer. Peers get the scan within the same `keep` and `remove` boxes, drop
-outliers by their own filter, find normals by their own, and have these turned towards the true
-stations for them; Poisson's invented surface is cut by density.
+follow the methods of `room.surface.method`, each with this tour.toml as far as the finest level of
+detail, and the best of three settings of each peer. `oracle`: the scan's true points in true
+colours, baked onto the true mesh by the same stages; `panoramas`: the room published from its E57,
+coloured by the panoramas in it. Peers get the scan cropped to the room, drop outliers by their own
+filter, find normals by their own, and have these turned towards the true stations for them;
+Poisson's invented surface is cut by density.
 
 - `precision` and `recall` at a distance are shares of the mesh near the truth, and of the truth
   that a station sees near the mesh; the F-score is their harmonic mean. Mesh over 30 mm behind
@@ -36,9 +40,9 @@ stations for them; Poisson's invented surface is cut by density.
   how many are broken, that is lack two slices of 10 mm in a row.
 - `discs`: of what truly lies under the tripods, the share that is closed (mesh before it or less
   than 100 mm behind) and true (within 20 mm), in all, under the worst, and (`blind`) where no
-  station sees it. `openings`: of the area of doors and windows,
-  20 mm within their rims, the share that one sees straight through, in all and of the worst;
-  `outlook`: of the directions in which a station sees no surface, the share without mesh.
+  station sees it. `openings`: of the area of doors and windows, 20 mm within their rims, the share
+  that one sees straight through, in all and of the worst; `outlook`: of the directions in which a
+  station sees no surface, the share without mesh.
 - `psnr` and `ssim`: ten views a room of 960 x 540 pixels, in Chromium, against the textured
   truth; glass, mirror and lamp masked, one gain a channel and room fitted first. Peers are
   decimated and coloured by their own chain to the bytes of the published room, and drawn by ray
@@ -48,46 +52,9 @@ stations for them; Poisson's invented surface is cut by density.
   `squares`: share of the plaque's squares told apart in a view from 1.5 m, and their contrast
   over the truth's.
 """
-
-
-@dataclass(frozen=True)
-class RoomResult:
-    """All that was found in a room.
-
-    Attributes:
-        room: Its id.
-        columns: Figures by contestant.
-        settings: The setting of each peer's column.
-        attempts: Program, setting and figures of every attempt.
-        refused: Methods that would not, with their reasons.
-        cleaning: What cleaning did to the scan, by its format.
-        pictures: By contestant, and of "truth"; empty where none were taken.
-    """
-
-    room: str
-    columns: Mapping[str, Figures]
-    settings: Mapping[str, str]
-    attempts: Sequence[tuple[str, str, Figures]]
-    refused: Mapping[str, str]
-    cleaning: Mapping[str, Figures]
-    pictures: Mapping[str, Sequence[UInt8]]
-
-    @property
-    def own(self) -> str:
-        """Our column that is held against the peers."""
-        return next(name for name in OURS if name in self.columns)
-
-    @property
-    def won(self) -> bool:
-        """Whether no peer has a higher F-score at 5 mm or PSNR."""
-        mine = self.columns[self.own]
-        theirs = [self.columns[name] for name in self.settings]
-        return all(
-            mine[key] > other[key]
-            for other in theirs
-            for key in ("f_score_5mm", "psnr_db")
-            if key in mine and key in other
-        )
+ASKED = """By the lines of what was asked: our figure, whether it holds, and in brackets the best
+peer's where ours has to be better. What is not measured in a room is left out.
+"""
 
 
 def table(result: RoomResult) -> str:
@@ -101,8 +68,12 @@ def table(result: RoomResult) -> str:
     for key in figures:
         cells = " | ".join(_shown(key, result.columns[name].get(key)) for name in names)
         lines.append(f"| {key} | {cells} |")
-    refusals = [f"`{method}` refuses: {why}." for method, why in result.refused.items()]
-    return "\n".join([*lines, *([""] if refusals else []), *refusals, ""])
+    notes = [f"- `{method}` refuses: {why}." for method, why in result.refused.items()]
+    notes += [f"- `{method}`: {told}." for method, told in result.told.items()]
+    if len(result.methods) > 1:
+        first = max(result.methods, key=lambda name: result.columns[name]["f_score_5mm"])
+        notes.append(f"- By F-score at 5 mm the best method is `{first}`.")
+    return "\n".join([*lines, *([""] if notes else []), *notes, ""])
 
 
 def _shown(key: str, value: float | None) -> str:
@@ -114,17 +85,26 @@ def _shown(key: str, value: float | None) -> str:
     return f"{value:.{digits + (key in ('ssim', 'normal_agreement'))}f}"
 
 
-def write(results: Sequence[RoomResult], file: Path) -> None:
-    """Rewrite the section of a Markdown file, and the pictures in ``pictures/`` beside it."""
-    parts = [PREAMBLE]
+def write(results: Sequence[RoomResult], sheets: Path, file: Path) -> None:
+    """Rewrite the section of a Markdown file, and the pictures in ``pictures/`` beside it.
+
+    Args:
+        results: Of all rooms.
+        sheets: The folder in which their sheets lie.
+        file: The Markdown.
+    """
+    pictures = file.parent / "pictures"
+    pictures.mkdir(exist_ok=True)
+    parts = [PREAMBLE, "### What was asked\n", ASKED, aims_table(results)]
     for result in results:
-        parts.append(f"### {result.room}\n\n{table(result)}")
-        for number in SHOWN_CAMERAS if result.pictures else ():
-            name = f"fidelity-{result.room}-{number}.webp"
-            names = _side_by_side(result, number, file.parent / "pictures" / name)
-            parts.append(f"{' | '.join(names)}:\n\n![{result.room}](pictures/{name})\n")
+        parts.append(f"### {result.room}\n")
+        parts += [f"{result.about}\n"] if result.about else []
+        parts.append(table(result))
+        for sheet in result.sheets:
+            shutil.copyfile(sheets / sheet.file, pictures / sheet.file)
+            parts.append(f"{', '.join(sheet.names)}:\n\n![{result.room}](pictures/{sheet.file})\n")
     parts.append(_cleaning(results))
-    parts.append(_attempts(results))
+    parts.append(_tries(results))
     rewrite(file, HEADING, "\n".join(parts))
 
 
@@ -151,49 +131,48 @@ def _cleaning(results: Sequence[RoomResult]) -> str:
     return "\n".join([*lines, ""])
 
 
-def _attempts(results: Sequence[RoomResult]) -> str:
-    """The F-score at 5 mm of every setting of every peer."""
-    found = {
-        (program, setting): each
-        for attempt in ATTEMPTS
-        for program, setting in [(attempt.program, attempt.setting)]
-        if (each := _f_scores(results, program, setting))
-    }
-    if not found:
+def _tries(results: Sequence[RoomResult]) -> str:
+    """The F-score at 5 mm of every setting of every peer, or why it has none."""
+    rooms = [result for result in results if result.tries]
+    if not rooms:
         return ""
-    rooms = [result.room for result in results]
     lines = [
         "### Settings of the peers\n\nF-score at 5 mm.\n",
-        f"| program | setting | {' | '.join(rooms)} |",
+        f"| program | setting | {' | '.join(result.room for result in rooms)} |",
         f"|---|---|{'---|' * len(rooms)}",
     ]
-    for (program, setting), scores in found.items():
-        cells = " | ".join(f"{scores[room]:.4f}" if room in scores else "" for room in rooms)
-        lines.append(f"| {program} | {setting} | {cells} |")
+    for attempt in ATTEMPTS:
+        cells = " | ".join(_try(result, attempt.program, attempt.setting) for result in rooms)
+        lines.append(f"| {attempt.program} | {attempt.setting} | {cells} |")
     return "\n".join(lines)
 
 
-def _f_scores(results: Sequence[RoomResult], program: str, setting: str) -> dict[str, float]:
-    return {
-        result.room: figures["f_score_5mm"]
-        for result in results
-        for name, how, figures in result.attempts
-        if (name, how) == (program, setting)
-    }
+def _try(result: RoomResult, program: str, setting: str) -> str:
+    return next(
+        (
+            each.why if each.f_score_5mm is None else f"{each.f_score_5mm:.4f}"
+            for each in result.tries
+            if (each.program, each.setting) == (program, setting)
+        ),
+        "",
+    )
 
 
-def _side_by_side(result: RoomResult, number: int, file: Path) -> list[str]:
-    """Save one camera's pictures, two in a row; who is seen, in reading order."""
-    from PIL import Image
+def side_by_side(pictures: Mapping[str, UInt8], file: Path) -> Sheet:
+    """Save pictures with the names of what they show."""
+    from PIL import Image, ImageDraw, ImageFont
 
-    names = ["truth", result.own, *result.settings]
     width, height = SHOWN_SIZE
-    rows = -(-len(names) // 2)
-    sheet = Image.new("RGB", (2 * width, rows * height), "white")
-    for place, name in enumerate(names):
-        picture = Image.fromarray(np.asarray(result.pictures[name][number]))
-        at = (place % 2 * width, place // 2 * height)
-        sheet.paste(picture.resize(SHOWN_SIZE, Image.Resampling.LANCZOS), at)
-    file.parent.mkdir(exist_ok=True)
+    rows = -(-len(pictures) // ASIDE)
+    sheet = Image.new("RGB", (ASIDE * width, rows * height), "white")
+    pen, font = ImageDraw.Draw(sheet), ImageFont.load_default(size=20)
+    for place, (name, picture) in enumerate(pictures.items()):
+        left, top = place % ASIDE * width, place // ASIDE * height
+        shown = Image.fromarray(np.asarray(picture)).resize(SHOWN_SIZE, Image.Resampling.LANCZOS)
+        sheet.paste(shown, (left, top))
+        box = pen.textbbox((left + 12, top + 10), name, font=font)
+        pen.rectangle((box[0] - 6, box[1] - 4, box[2] + 6, box[3] + 4), fill="black")
+        pen.text((left + 12, top + 10), name, font=font, fill="white")
+    file.parent.mkdir(parents=True, exist_ok=True)
     sheet.save(file, quality=QUALITY, method=6)
-    return names
+    return Sheet(file.name, tuple(pictures))

@@ -17,6 +17,7 @@ from tourgen.geometry import Float32, Float64, UInt8
 
 Bools = npt.NDArray[np.bool_]
 GALLERY = "gallery_sim"
+AROUND_M = 0.1
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,13 @@ class BenchRoom:
             kept &= ~box.holds(points)
         return points[kept], colors[kept]
 
+    def cropped(self) -> Float32:
+        """The cloud's points in and near the room, as one would crop them by hand."""
+        points, _ = self.cloud()
+        seen = self.truth().vertices
+        room = Box(seen.min(axis=0) - AROUND_M, seen.max(axis=0) + AROUND_M)
+        return points[room.holds(points)]
+
 
 def demo_rooms(tour: Path) -> list[BenchRoom]:
     """The rooms of a simulated tour, as its tour.toml describes them."""
@@ -108,6 +116,12 @@ def gallery(folder: Path, scratch: Path) -> BenchRoom:
 
 def _boxes(told: Sequence[dict[str, Sequence[float]]]) -> Iterator[Box]:
     return (Box(np.array(each["min"], float), np.array(each["max"], float)) for each in told)
+
+
+def stamp(file: Path) -> str:
+    """Of a file's state: its size and time of change."""
+    about = file.stat()
+    return f"{about.st_size}-{about.st_mtime_ns}"
 
 
 def read_scan(scan: Path) -> tuple[Float32, UInt8]:

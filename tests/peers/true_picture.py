@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -75,43 +75,8 @@ class TexturedTruth:
 
     @cached_property
     def cameras(self) -> tuple[Camera, ...]:
-        """Ten places where one can stand, each with a direction to look; always the same."""
-        found: list[Camera] = []
-        for camera in self._tries():
-            reach = self._reach(camera.rays((48, 27)))
-            if np.isfinite(reach).mean() > INSIDE_SHARE and np.median(reach) > VIEW_M:
-                found.append(camera)
-            if len(found) == CAMERAS:
-                break
-        return tuple(found)
-
-    def _tries(self) -> Iterator[Camera]:
-        rng = np.random.default_rng(11)
-        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
-        while True:
-            eye = rng.uniform(low, high)
-            turn, tilt = rng.uniform(0, 2 * np.pi), rng.uniform(-0.6, 0.35)
-            down = self._reach(np.array([[*eye, 0, 0, -1]], np.float32))[0]
-            if not np.isfinite(down):
-                continue
-            eye[2] += EYE_M - down
-            if self._clearance(eye) < CLEARANCE_M or not self._inside(eye):
-                continue
-            ahead = [np.cos(turn) * np.cos(tilt), np.sin(turn) * np.cos(tilt), np.sin(tilt)]
-            yield Camera(eye, eye + ahead)
-
-    def _reach(self, cast: Float32) -> Float64:
-        reach: Float64 = self.scene.cast_rays(tensor(cast))["t_hit"].numpy()
-        return reach * np.linalg.norm(cast[..., 3:], axis=-1)
-
-    def _clearance(self, place: Float64) -> float:
-        return float(self.scene.compute_distance(tensor(place[None])).numpy()[0])
-
-    def _inside(self, place: Float64) -> bool:
-        directions = np.random.default_rng(1).normal(size=(300, 3))
-        origins = np.broadcast_to(place, directions.shape)
-        reach = self._reach(np.concatenate([origins, directions], axis=1).astype(np.float32))
-        return bool(np.isfinite(reach).mean() > INSIDE_SHARE)
+        """Ten places where one can stand, each with a direction to look."""
+        return cameras_in(self.vertices, self.scene)
 
     def shot(self, camera: Camera) -> Shot:
         """What a camera sees, and what of it is judged."""
@@ -129,6 +94,59 @@ class TexturedTruth:
         for opening in self.facts["openings"]:
             masked |= _through(opening, cast, reach)
         return masked, reach * np.linalg.norm(cast[..., 3:], axis=-1)
+
+
+def cameras_in(vertices: Float64, scene: Any) -> tuple[Camera, ...]:
+    """Ten places where one can stand in a surface, each with a direction to look; always the same.
+
+    Args:
+        vertices: (v, 3) of the surface, metres.
+        scene: Its ray casting scene.
+    """
+    found: list[Camera] = []
+    for camera in _tries(vertices, scene):
+        reach = _reach(scene, camera.rays((48, 27)))
+        if np.isfinite(reach).mean() > INSIDE_SHARE and np.median(reach) > VIEW_M:
+            found.append(camera)
+        if len(found) == CAMERAS:
+            break
+    return tuple(found)
+
+
+def busiest(cameras: Sequence[Camera], scene: Any) -> list[int]:
+    """Numbers of cameras, those first that see the most faces of a surface."""
+    faces = [scene.cast_rays(tensor(each.rays((96, 54))))["primitive_ids"] for each in cameras]
+    seen = [len(np.unique(each.numpy())) for each in faces]
+    return sorted(range(len(cameras)), key=lambda number: -seen[number])
+
+
+def _tries(vertices: Float64, scene: Any) -> Iterator[Camera]:
+    rng = np.random.default_rng(11)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    while True:
+        eye = rng.uniform(low, high)
+        turn, tilt = rng.uniform(0, 2 * np.pi), rng.uniform(-0.6, 0.35)
+        down = _reach(scene, np.array([[*eye, 0, 0, -1]], np.float32))[0]
+        if not np.isfinite(down):
+            continue
+        eye[2] += EYE_M - down
+        clearance_m = float(scene.compute_distance(tensor(eye[None])).numpy()[0])
+        if clearance_m < CLEARANCE_M or not _inside(scene, eye):
+            continue
+        ahead = [np.cos(turn) * np.cos(tilt), np.sin(turn) * np.cos(tilt), np.sin(tilt)]
+        yield Camera(eye, eye + ahead)
+
+
+def _inside(scene: Any, place: Float64) -> bool:
+    directions = np.random.default_rng(1).normal(size=(300, 3))
+    origins = np.broadcast_to(place, directions.shape)
+    reach = _reach(scene, np.concatenate([origins, directions], axis=1).astype(np.float32))
+    return bool(np.isfinite(reach).mean() > INSIDE_SHARE)
+
+
+def _reach(scene: Any, cast: Float32) -> Float64:
+    reach: Float64 = scene.cast_rays(tensor(cast))["t_hit"].numpy()
+    return reach * np.linalg.norm(cast[..., 3:], axis=-1)
 
 
 def read_textured(path: Path) -> tuple[Float64, Float32, Int32]:

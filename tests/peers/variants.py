@@ -1,84 +1,138 @@
-"""The tour as each method builds it: a folder beside, whose tour.toml names the method."""
+"""A room as each method draws it, and what the bench makes of a tour beside.
+
+Only what is published needs tiles, textures and posters: a method is run as far as the levels of
+detail, in the cache of the tour that it is a variant of, so that the points are cleaned once.
+"""
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
-GALLERY_TOUR = """[tour]
-title = { en = "Gallery" }
-languages = ["en"]
-start = "gallery_sim"
+import numpy as np
+from apart import apart
+from rooms import GALLERY
+
+from tourgen.build import build_tour
+from tourgen.cache import Cache
+from tourgen.errors import TourgenError
+from tourgen.fitting.surface import Drawn
+from tourgen.pipeline import tour_recipes
+from tourgen.progress import Started
+from tourgen.stages.levels import Levels
+from tourgen.tasks import Runner, Task, in_order
+from tourgen.tour import Tour, load_tour
+
+GALLERY_TOUR = f"""[tour]
+title = {{ en = "Gallery" }}
 
 [[room]]
-id = "gallery_sim"
-title = { en = "Gallery" }
+id = "{GALLERY}"
 scans = ["scans/scan_structured.e57"]
 """
+_NEEDED = ("surface", "levels")
 
 
-def gallery_tour(gallery: Path, scratch: Path) -> Path:
-    """A tour's folder with the gallery alone."""
+def gallery_tour(gallery: Path, scratch: Path) -> Tour:
+    """A tour with the gallery alone."""
     folder = scratch / "gallery"
     folder.mkdir(parents=True, exist_ok=True)
-    _link(folder / "scans", gallery)
+    link(folder / "scans", gallery)
     (folder / "tour.toml").write_text(GALLERY_TOUR, encoding="utf-8")
-    return folder
+    return load_tour(folder)
 
 
-def built(tour: Path, name: str, room: str, scratch: Path, method: str | None = None) -> Path | str:
-    """The site of a tour of one room; why not, where it cannot be built.
+def link(place: Path, target: Path) -> None:
+    """A folder that is another's."""
+    if not place.is_symlink():
+        place.symlink_to(target.resolve(), target_is_directory=True)
+
+
+def alone(tour: Tour, room: str, folder: Path, **changes: Any) -> Tour:
+    """A tour of one room in a folder, without texts and doors.
 
     Args:
-        tour: With scans and tour.toml.
-        name: Of the variant.
-        room: To be built.
-        scratch: Keeps the variant's folder, and so its cache.
-        method: For ``room.surface.method``; none: ``name``, "": as the tour says.
+        tour: That has the room.
+        room: Its id.
+        folder: Where the paths of the room start.
+        changes: Settings of the room that differ.
     """
-    folder = scratch / "variants" / f"{room}-{name}"
-    folder.mkdir(parents=True, exist_ok=True)
-    for part in ("scans", "texts"):
-        if (tour / part).exists():
-            _link(folder / part, tour / part)
-    told = alone((tour / "tour.toml").read_text(encoding="utf-8"), room)
-    chosen = name if method is None else method
-    told = with_method(told, chosen) if chosen else told
-    (folder / "tour.toml").write_text(told, encoding="utf-8")
-    program = Path(sys.executable).with_name("tourgen")
-    ran = subprocess.run(
-        [program, "build", str(folder)], check=False, stderr=subprocess.PIPE, text=True
-    )
-    if ran.returncode:
-        lines = [line for line in ran.stderr.splitlines() if line.startswith("error: ")]
-        return lines[0].removeprefix("error: ") if lines else ran.stderr.strip()[-200:]
-    return folder / "site"
+    bare = tour.room(room).model_copy(update={"text": {}, "links": (), "notes": (), **changes})
+    return tour.model_copy(update={"folder": folder.resolve(), "start": room, "rooms": (bare,)})
 
 
-def alone(told: str, room: str) -> str:
-    """tour.toml with one room, and without doors to others."""
-    head, *rooms = told.split("[[room]]\n")
-    mine = next(each for each in rooms if f'id = "{room}"' in each)
-    body, *tables = mine.split("\n[[room.")
-    kept = [table for table in tables if not table.startswith("link]]")]
-    lines = [
-        f'start = "{room}"' if line.startswith("start =") else line for line in head.split("\n")
-    ]
-    return "\n".join(lines) + "[[room]]\n" + "\n[[room.".join([body, *kept])
+def scanned(tour: Tour, room: str, scan: str) -> dict[str, Any]:
+    """The change that lets a room take one other scan."""
+    first = tour.room(room).scans[0]
+    return {"scans": (first.model_copy(update={"file": scan}),)}
 
 
-def with_method(told: str, method: str) -> str:
-    """tour.toml of one room with its surface made by a method; its other settings stay."""
-    line = f'method = "{method}"'
-    if "[room.surface]" not in told:
-        return f"{told.rstrip()}\n\n[room.surface]\n{line}\n"
-    before, after = told.split("[room.surface]", 1)
-    table, *rest = after.split("\n[")
-    kept = [each for each in table.splitlines() if not each.strip().startswith("method")]
-    return "\n[".join([f"{before}[room.surface]\n{line}" + "\n".join(kept), *rest])
+def drawn(tour: Tour, room: str, method: str, scratch: Path) -> Path | str:
+    """The finest level of a room by a method; why not, where it cannot be drawn.
+
+    Args:
+        tour: Its cache is used.
+        room: To be drawn.
+        method: For ``room.surface.method``; the room's other settings stay.
+        scratch: Keeps the mesh.
+
+    Returns:
+        An ``.npz`` with ``vertices``, ``faces`` and ``told``, what the report says of the surface.
+    """
+    surface = tour.room(room).surface.model_copy(update={"method": method})
+    variant = alone(tour, room, tour.folder, surface=surface)
+    file = scratch / "drawn" / room / f"{method}-{_tasks(variant)['levels'].key[:16]}.npz"
+    why = file.with_suffix(".txt")
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        why.unlink(missing_ok=True)
+        failed = apart(_draw, variant, file, why)
+        if failed or why.exists():
+            return failed or why.read_text(encoding="utf-8")
+    return file
 
 
-def _link(link: Path, target: Path) -> None:
-    if not link.is_symlink():
-        link.symlink_to(target.resolve(), target_is_directory=True)
+def _draw(variant: Tour, file: Path, why: Path) -> None:
+    tasks = _tasks(variant)
+    runner = Runner(Cache(variant.folder), tuple(tasks[name] for name in _NEEDED), _announce)
+    try:
+        runner.run()
+        levels: Levels = runner.result(tasks["levels"])
+        surface: Drawn = runner.result(tasks["surface"])
+    except TourgenError as error:
+        why.write_text(error.message, encoding="utf-8")
+        return
+    mesh = levels.finest
+    aside = file.with_name(f".{file.name}")
+    told = np.array(surface.told)
+    np.savez(aside, vertices=mesh.vertices + mesh.origin, faces=mesh.faces, told=told)
+    aside.rename(file)
+
+
+def _tasks(variant: Tour) -> dict[str, Task[Any]]:
+    """The stages of a tour's only room by name."""
+    (recipe,) = tour_recipes(variant, Cache(variant.folder))
+    return {each.name: each for each in in_order(recipe.goals)}
+
+
+def built(variant: Tour) -> Path | str:
+    """The site of a tour, in its folder; why not, where it cannot be built."""
+    why = variant.folder / "failed.txt"
+    why.unlink(missing_ok=True)
+    failed = apart(_build, variant, why)
+    if failed or why.exists():
+        return failed or why.read_text(encoding="utf-8")
+    return variant.folder / "site"
+
+
+def _build(variant: Tour, why: Path) -> None:
+    try:
+        build_tour(variant, variant.folder / "site", _announce)
+    except TourgenError as error:
+        why.write_text(error.message, encoding="utf-8")
+
+
+def _announce(at: Task[Any] | Started) -> None:
+    stage = at.stage if isinstance(at, Started) else at.name
+    if stage:  # "" when a room is done
+        print(f"  {stage}", flush=True)

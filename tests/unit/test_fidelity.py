@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
-import tomllib
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
+import aims
+import apart
+import fidelity
 import numpy as np
 import picture_score
 import planes
 import plaque
+import programs
 import pytest
 import report
+import results
 import score
 import seams
 import sections
 import surface_score
+import thinned
 import variants
 from drawing import Camera, draw, vertex_colored
 from gaps import Gaps
@@ -24,6 +32,7 @@ from rooms import BenchRoom
 from true_picture import Shot
 
 from tourgen.simulation.light import ray_scene
+from tourgen.tour import load_tour
 
 CORNERS = np.array(
     [[x, y, z] for z in (0.0, 2.5) for y in (-2.0, 2.0) for x in (-2.0, 2.0)], np.float64
@@ -284,44 +293,159 @@ def test_a_section_is_rewritten_alone(tmp_path: Path) -> None:
     assert told == "# Benchmarks\n\n## One\n\nthird\n\n## Two\n\nsecond\n\n### Part\n\nmore\n"
 
 
-def test_a_variant_differs_by_its_method_alone() -> None:
-    told = (Path(__file__).parents[2] / "sites/lighthouse/tour.toml").read_text(encoding="utf-8")
-    whole = {room["id"]: room for room in tomllib.loads(told)["room"]}
-    variant = tomllib.loads(variants.with_method(variants.alone(told, "chamber2"), "auto"))
-    (room,) = variant["room"]
-    assert room.pop("surface")["method"] == "auto"
-    expected = {key: value for key, value in whole["chamber2"].items() if key != "link"}
-    expected.pop("surface", None)
-    assert room == expected
-    assert variant["tour"]["start"] == "chamber2"
+def test_a_method_is_drawn_in_the_tours_cache_from_its_cleaned_points(
+    box_copy: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    tour = load_tour(box_copy)
+    room = tour.rooms[0].id
+    file = variants.drawn(tour, room, "poisson", tmp_path)
+    assert isinstance(file, Path)
+    assert capfd.readouterr().out.split() == ["surface", "trim", "hygiene", "levels"]
+    with np.load(file) as stored:
+        assert len(stored["faces"]) > 1000
+        assert str(stored["told"]) == "poisson: as asked for"
+    assert variants.drawn(tour, room, "poisson", tmp_path) == file
+    assert not capfd.readouterr().out
 
 
-def result(mine: float, theirs: float, pictures: dict[str, list[np.ndarray]]) -> report.RoomResult:
-    return report.RoomResult(
+def test_what_a_method_refuses_is_told_and_no_mesh(box_copy: Path, tmp_path: Path) -> None:
+    tour = load_tour(box_copy)
+    room = tour.rooms[0]
+    huge = room.surface.model_copy(update={"detail_mm": 500.0})
+    told = variants.drawn(
+        tour.model_copy(update={"rooms": (room.model_copy(update={"surface": huge}),)}),
+        room.id,
+        "signed-distance",
+        tmp_path,
+    )
+    assert isinstance(told, str)
+    assert "detail_mm" in told
+
+
+def never_ends() -> None:
+    while True:
+        pass
+
+
+def dies() -> None:
+    os._exit(3)
+
+
+def test_work_apart_that_dies_or_never_ends_is_told() -> None:
+    assert apart.apart(dies) == "died (exit code 3)"
+    assert apart.apart(never_ends, limit_s=1).startswith("was stopped after")
+    assert apart.apart(print) == ""
+
+
+def test_a_thinned_scan_has_the_points_asked_for_and_even(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(thinned, "POINTS", 2000)
+    rng = np.random.default_rng(0)
+    points = np.column_stack([rng.random((100_000, 2)), np.zeros(100_000)]).astype(np.float32)
+    points[:50_000] *= 0.3  # dense in a corner
+    kept = points[thinned.kept(points)]
+    assert 1900 <= len(kept) <= 2000
+    assert (kept.max(axis=1) < 0.3).mean() == pytest.approx(0.09, abs=0.01)
+
+
+def test_faces_are_turned_to_the_stations() -> None:
+    flipped = FACES.copy()
+    flipped[::2] = flipped[::2, ::-1]
+    turned = programs.facing_stations(CORNERS, flipped, np.array([[0.0, 0.0, 1.5]]))
+    normals = surface_score.face_normals(CORNERS, turned)
+    assert np.allclose(normals, surface_score.face_normals(CORNERS, FACES))
+
+
+PEER = "Open3D Poisson"
+
+
+def result(mine: float, theirs: float) -> results.RoomResult:
+    return results.RoomResult(
         "hall",
-        {"published": {"f_score_5mm": mine}, "Open3D Poisson": {"f_score_5mm": theirs}},
-        {"Open3D Poisson": "depth 9, cut 5 %"},
-        [("Open3D Poisson", "depth 9, cut 5 %", {"f_score_5mm": theirs})],
-        {"crust": "too many points"},
-        {"ply": {"stray": 0.5}},
-        pictures,
+        columns={
+            "published": {"f_score_5mm": mine, "psnr_db": 29.0, "walls_rms_mm": 0.5},
+            "oracle": {"psnr_db": 31.5},
+            "poisson": {"f_score_5mm": 0.7},
+            "signed-distance": {"f_score_5mm": 0.8},
+            PEER: {"f_score_5mm": theirs, "psnr_db": 20.0, "walls_rms_mm": 0.7},
+        },
+        settings={PEER: "depth 9, cut 5 %"},
+        tries=(
+            results.Try(PEER, "depth 9, cut 5 %", theirs),
+            results.Try(PEER, "depth 10, cut 2 %", None, "died (exit code 1)"),
+        ),
+        refused={"crust": "too many points"},
+        cleaning={"ply": {"stray": 0.5, "lost": 0.001}},
     )
 
 
 def test_a_room_is_won_by_the_higher_score() -> None:
-    assert result(0.91, 0.9, {}).won
-    assert not result(0.9, 0.91, {}).won
+    assert result(0.91, 0.9).won
+    assert result(0.9, 0.91).lost == [f"hall: f_score_5mm: published 0.9, {PEER} 0.91"]
+    assert not result(0.9, 0.9).won
+
+
+def test_aims_hold_or_fall_short() -> None:
+    (line,) = [each for each in aims.aims_table([result(0.91, 0.9)]).splitlines() if "f_sc" in each]
+    assert line.endswith("| ✓ 0.91 (0.9) |")
+    short = aims.short_of([result(0.9, 0.91)])
+    assert [each.split(": ")[1] for each in short] == ["f_score_5mm", "ply", "psnr_below_oracle_db"]
+    assert "hall: psnr_below_oracle_db: 2.5, asked ≤ 2" in short
 
 
 def test_the_report_shows_scores_refusals_and_pictures(tmp_path: Path) -> None:
-    views = [np.full((54, 96, 3), 90, np.uint8)] * 10
-    pictures = dict.fromkeys(("truth", "published", "Open3D Poisson"), views)
-    report.write([result(0.91, 0.9, pictures)], tmp_path / "benchmarks.md")
+    views = {name: np.full((54, 96, 3), 90, np.uint8) for name in ("truth", "published", PEER)}
+    sheet = report.side_by_side(views, tmp_path / "sheets" / "fidelity-hall-0.webp")
+    shown = dataclasses.replace(result(0.91, 0.9), sheets=(sheet,))
+    report.write([shown], tmp_path / "sheets", tmp_path / "benchmarks.md")
     told = (tmp_path / "benchmarks.md").read_text(encoding="utf-8")
-    assert "| f_score_5mm | 0.9100 | 0.9000 |" in told
+    assert "| f_score_5mm | 0.9100 |  | 0.7000 | 0.8000 | 0.9000 |" in told
+    assert "the best method is `signed-distance`" in told
     assert "`crust` refuses: too many points." in told
     assert "| Open3D Poisson | depth 9, cut 5 % | 0.9000 |" in told
+    assert "| Open3D Poisson | depth 10, cut 2 % | died (exit code 1) |" in told
     assert "| stray | 0.5000 |" in told
-    for number in report.SHOWN_CAMERAS:
-        assert (tmp_path / "pictures" / f"fidelity-hall-{number}.webp").exists()
-        assert f"pictures/fidelity-hall-{number}.webp" in told
+    assert (tmp_path / "pictures" / "fidelity-hall-0.webp").exists()
+    assert "pictures/fidelity-hall-0.webp" in told
+
+
+def test_a_result_is_read_back_as_it_was_kept(tmp_path: Path) -> None:
+    kept = dataclasses.replace(result(0.91, 0.9), sheets=(results.Sheet("a.webp", ("truth",)),))
+    results.save(kept, tmp_path / "hall.json")
+    assert results.saved(tmp_path / "hall.json") == kept
+
+
+@pytest.fixture
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
+    """The command on rooms whose judgement is given; what the docs say after."""
+    monkeypatch.setattr(fidelity, "demo_rooms", lambda _: [SimpleNamespace(id=r) for r in "ab"])
+    docs = tmp_path / "benchmarks.md"
+
+    def run(*options: str, score: float = 0.5) -> str:
+        monkeypatch.setattr(fidelity, "_judged", lambda room, _: named(room.id, score))
+        scratch = ("--scratch", str(tmp_path / "scratch"))
+        asked = ["fidelity", str(tmp_path), *scratch, "--write", str(docs), *options]
+        monkeypatch.setattr("sys.argv", asked)
+        assert fidelity.main() == 0
+        return docs.read_text(encoding="utf-8") if docs.exists() else ""
+
+    def named(room: str, score: float) -> results.RoomResult:
+        return results.RoomResult(room, columns={"auto": {"f_score_5mm": score}})
+
+    return run
+
+
+def test_a_run_of_one_room_keeps_the_others(command: Callable[..., str]) -> None:
+    assert command("--room", "a") == "", "the others were never judged"
+    assert command().count("0.5000") == 2
+    told = command("--room", "b", score=0.75)
+    assert told.count("0.5000") == 1
+    assert told.count("0.7500") == 1
+
+
+def test_a_run_of_some_methods_writes_nothing(
+    command: Callable[..., str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = command()
+    assert command("--method", "poisson", score=0.75) == before
+    assert "writes no docs: not all contestants were judged" in capsys.readouterr().out
+    assert command("--room", "a").count("0.5000") == 2, "nor is it kept"
