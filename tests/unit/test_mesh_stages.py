@@ -21,7 +21,9 @@ from tourgen.stages.mesh_arrays import (
 from tourgen.stages.surface import poisson
 
 STATION = np.array([[0.3, 0.2, 1.5]])
-WINDOW = ((1.9, -0.5, 1.0), (2.1, 0.5, 2.0))
+Box = tuple[tuple[float, ...], tuple[float, ...]]
+WINDOW: Box = ((1.9, -0.5, 1.0), (2.1, 0.5, 2.0))
+DOOR: Box = ((1.9, -0.7, 0.0), (2.1, 0.7, 2.3))
 
 
 def room_cloud() -> OrientedCloud:
@@ -50,7 +52,7 @@ def room_cloud() -> OrientedCloud:
     return OrientedCloud(cloud, np.float32(normal[keep]), STATION)
 
 
-def inside(points: np.ndarray, box: tuple[tuple[float, ...], ...]) -> np.ndarray:
+def inside(points: np.ndarray, box: Box) -> np.ndarray:
     return np.all((points >= box[0]) & (points <= box[1]), axis=1)
 
 
@@ -108,6 +110,46 @@ def test_windows_open_and_blind_discs_stay_closed(solved: Mesh, trimmed: Mesh) -
     assert covered(trimmed, eye, [-2, 0, 1.5]), "a wall"
     lost = face_areas(solved).sum() - face_areas(trimmed).sum()
     assert lost == pytest.approx(1.0, abs=0.35), "as much as the window, and nothing else"
+
+
+def domed_room(opening: Box, station: list[float]) -> tuple[OrientedCloud, Mesh]:
+    """The room with another opening in the wall x = 2: its scan, and a dome outside closes it."""
+    shell = trimesh.creation.box((4, 4.8, 2.5)).apply_translation([0, 0, 1.25])
+    points, face = trimesh.sample.sample_surface(shell, 150_000, seed=1)
+    gap = inside(points, opening)
+    gap |= (points[:, 2] < 1e-6) & (np.linalg.norm(points[:, :2] - station[:2], axis=1) < 0.85)
+    at, normals = np.float32(points[~gap]), np.float32(-shell.face_normals[face[~gap]])
+    color, own = np.zeros((len(at), 3), np.uint8), np.zeros(len(at), np.int16)
+    cloud = OrientedCloud(PointCloud(np.zeros(3), at, color, own), normals, np.array([station]))
+    shell.invert()
+    for _ in range(6):
+        shell = shell.subdivide()
+    vertices = np.float32(shell.vertices)
+    closing = inside(vertices, opening)
+    half = np.subtract(opening[1], opening[0])[1:] / 2
+    from_middle = np.abs(vertices[closing, 1:] - np.add(opening[0], opening[1])[1:] / 2) / half
+    vertices[closing, 0] += 0.3 * np.cos(np.pi / 2 * from_middle.max(axis=1))
+    return cloud, Mesh(np.zeros(3), vertices, shell.faces.astype(np.int32))
+
+
+def test_an_opening_seen_aslant_opens_as_far_as_its_rim() -> None:
+    """Most of the dome that closes it hides behind the wall."""
+    cloud, domed = domed_room(WINDOW, [1.6, -2.0, 1.5])
+    opened = trim.trim(domed, cloud, cloud.cloud, trim.Settings(support_m=0.12))
+    for y in (-0.35, -0.2, 0.0, 0.2, 0.35):
+        assert not covered(opened, [0, y, 1.5], [2, y, 1.5]), f"the window at y = {y}"
+    lost = face_areas(domed).sum() - face_areas(opened).sum()
+    assert lost < 1.5, "the dome, and nothing else"
+
+
+def test_a_blind_disc_in_a_doorway_stays_where_the_doorway_opens() -> None:
+    """No point lies between what closes the door and the floor under the tripod."""
+    cloud, domed = domed_room(DOOR, [1.2, 0.0, 1.5])
+    opened = trim.trim(domed, cloud, cloud.cloud, trim.Settings(support_m=0.12))
+    for z in (0.3, 1.0, 1.7):
+        assert not covered(opened, [0, 0, z], [2, 0, z]), f"the door at z = {z}"
+    for x in (0.6, 1.0, 1.4, 1.8):
+        assert covered(opened, [x, 0, 1.5], [x, 0, 0.0]), f"the floor at x = {x}"
 
 
 def test_a_bulge_is_drawn_back_behind_what_was_measured(oriented: OrientedCloud) -> None:

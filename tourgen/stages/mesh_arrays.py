@@ -87,6 +87,14 @@ def components(pairs: npt.NDArray[np.int64], count: int) -> Int32:
     return np.asarray(connected_components(graph, directed=False)[1], np.int32)
 
 
+def regions(mesh: Mesh, at: npt.NDArray[np.int64]) -> Int32:
+    """Number of the connected region that each chosen vertex lies in."""
+    number = np.full(len(mesh.vertices), -1)
+    number[at] = np.arange(len(at))
+    pair = number[edges(mesh.faces)]
+    return components(pair[np.all(pair >= 0, axis=1)], len(at))
+
+
 def weld(meshes: list[Mesh]) -> Mesh:
     """Join meshes of one origin; vertices at the same place become one."""
     vertices = np.concatenate([mesh.vertices for mesh in meshes])

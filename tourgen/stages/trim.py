@@ -26,21 +26,24 @@ from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud, PointCloud
 from tourgen.stages.bulges import mostly, without_bulges
+from tourgen.stages.covers import with_covers
 from tourgen.stages.free_space import free_space
 from tourgen.stages.mesh_arrays import (
     compact,
     components,
-    edges,
     face_adjacency,
     face_areas,
+    regions,
     vertex_areas,
     vertex_normals,
 )
 from tourgen.stages.specks import without_specks
 
-VERSION = 7
+VERSION = 8
 _ALIKE = 0.5
 """Cosine between a pane and its rest, at least."""
+_AROUND = 2.0
+"""What is so many times as near to an unsupported patch as its support would be lies around it."""
 
 Mask = npt.NDArray[np.bool_]
 
@@ -93,7 +96,7 @@ def _opened(mesh: Mesh, oriented: OrientedCloud, full: PointCloud, settings: Set
     if not loose.any():
         return mesh
     if not len(oriented.stations):
-        return _without_patches(mesh, loose, loose, settings.bridge_area_m2)
+        return _without_patches(mesh, loose, settings.bridge_area_m2)
     free = free_space(
         full,
         oriented.stations,
@@ -102,10 +105,10 @@ def _opened(mesh: Mesh, oriented: OrientedCloud, full: PointCloud, settings: Set
         settings.margin_m,
     )
     at = np.flatnonzero(loose)
-    patch = _regions(mesh, at)
+    patch = regions(mesh, at)
     held = free.holds(mesh.vertices[at])
     at, patch = at[held], patch[held]
-    region, area_m2 = _regions(mesh, at), vertex_areas(mesh)[at]
+    region, area_m2 = regions(mesh, at), vertex_areas(mesh)[at]
     out = free.leads_out(mesh.vertices[at])
     large = (np.bincount(region, area_m2) > settings.door_area_m2)[region]
     opening = mostly(out, region, area_m2) & (large | mostly(out, patch, area_m2))
@@ -117,8 +120,9 @@ def _opened(mesh: Mesh, oriented: OrientedCloud, full: PointCloud, settings: Set
         cut[shut[floating]] = True
     gone = np.zeros(len(mesh.vertices), bool)
     gone[at[cut]] = True
+    gone = with_covers(mesh, loose, gone, oriented.cloud.points, _AROUND * settings.support_m)
     gone |= _rim(mesh, distance_m, gone, settings.support_m)
-    return _without_patches(drawn, loose, gone, 0.0)
+    return compact(drawn, ~_cut_faces(drawn, gone))
 
 
 def _distance_m(places: Float32, points: Float32, most_m: float) -> Float64:
@@ -132,14 +136,6 @@ def _in_boxes(places: Float32, settings: Settings) -> Mask:
     for low, high in settings.closed:
         inside |= np.all((places >= low) & (places <= high), axis=1)
     return inside
-
-
-def _regions(mesh: Mesh, at: npt.NDArray[np.int64]) -> npt.NDArray[np.int32]:
-    """Number of the connected region that each chosen vertex lies in."""
-    number = np.full(len(mesh.vertices), -1)
-    number[at] = np.arange(len(at))
-    pair = number[edges(mesh.faces)]
-    return components(pair[np.all(pair >= 0, axis=1)], len(at))
 
 
 def _rim(mesh: Mesh, distance_m: Float64, gone: Mask, support_m: float) -> Mask:
@@ -162,24 +158,23 @@ def _rim(mesh: Mesh, distance_m: Float64, gone: Mask, support_m: float) -> Mask:
     return rim
 
 
-def _without_patches(mesh: Mesh, loose: Mask, cut: Mask, least_m2: float) -> Mesh:
-    """Drop the faces with two vertices to cut, and the loose patches that are mostly such.
+def _cut_faces(mesh: Mesh, cut: Mask) -> Mask:
+    """Mask of the faces with two vertices to cut."""
+    return np.asarray(cut[mesh.faces].sum(axis=1) >= 2)
+
+
+def _without_patches(mesh: Mesh, loose: Mask, least_m2: float) -> Mesh:
+    """Drop the patches of unsupported surface.
 
     Args:
         mesh: Where from.
         loose: Mask of the unsupported vertices.
-        cut: Mask of those to cut.
         least_m2: Smaller patches stay.
     """
-    drop = cut[mesh.faces].sum(axis=1) >= 2
-    at = np.flatnonzero(loose[mesh.faces].all(axis=1) | drop)
-    if not len(at):
-        return mesh
+    drop = _cut_faces(mesh, loose)
+    at = np.flatnonzero(drop)
     patch = _patches(mesh, at)
-    area = face_areas(mesh)[at]
-    patch_area = np.bincount(patch, area)
-    mostly = np.bincount(patch, area * drop[at]) > 0.5 * patch_area
-    drop[at] = (drop[at] | mostly[patch]) & (patch_area > least_m2)[patch]
+    drop[at] = (np.bincount(patch, face_areas(mesh)[at]) > least_m2)[patch]
     return compact(mesh, ~drop)
 
 
