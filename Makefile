@@ -105,7 +105,7 @@ lint: install
 bench: demo
 	$(BIN)/python tests/peers/score.py $(DEMO) --table docs/benchmarks.md
 
-# Hours on 2 cores the first time; what was made or measured before is kept in build/fidelity.
+# Hours on 2 cores. Each room is written when judged; meshes and measures stay in build/fidelity.
 .PHONY: bench-fidelity
 bench-fidelity: demo system-bench $(VENV)/.bench
 	$(BIN)/python tests/peers/fidelity.py $(DEMO) --gallery ../shared/scans/gallery_sim \

@@ -4,9 +4,9 @@ Each room of a simulated tour, and the gallery where it is given, is reconstruct
 method of tourgen and by other programs at three settings each, from the same points. All are
 held against the truth, as surfaces (``surface_score``, ``planes``, ``gaps``) and as pictures
 (``picture_score``, ``seams``, ``plaque``); what goes before, as cleaning, is judged too.
-``--write`` puts tables and pictures into the docs. What was made or measured before is kept in
-``--scratch`` and not done again; rooms that are not asked for are written as they were last
-judged.
+``--write`` puts tables and pictures into the docs after every room, and what was found beside
+them, so that a run of hours may be cut: rooms that are not asked for are written as they were
+last judged. What was made or measured before is kept in ``--scratch`` and not done again.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ def main() -> int:
         else:
             results[name] = _judged(rooms[name], given)
         print(report.table(results[name]), flush=True)
-        if not _is_partial(given):
-            save(results[name], _kept(given, name))
-    _write(results, every, given)
+        if given.write:
+            save(results[name], _kept(given.write, name))
+            _write(every, given)
     for line in short_of(list(results.values())):
         print(f"falls short: {line}")
     lost = [line for each in results.values() for line in each.lost]
@@ -74,6 +74,9 @@ def _asked() -> argparse.Namespace:
     parser.add_argument("--skip-picture", action="store_true")
     parser.add_argument("--write", type=Path, help="write the section of this Markdown file")
     given = parser.parse_args()
+    if given.write and _is_partial(given):
+        print("writes no docs: not all contestants are judged", flush=True)
+        given.write = None
     given.scratch = given.scratch.resolve()
     return given
 
@@ -83,39 +86,22 @@ def _is_partial(given: argparse.Namespace) -> bool:
     return bool(given.method or given.skip_peers or given.skip_picture)
 
 
-def _kept(given: argparse.Namespace, room: str) -> Path:
+def _kept(docs: Path, room: str) -> Path:
     """Where a room's result is kept for runs that leave it out."""
-    file: Path = given.scratch / "results" / f"{room}.json"
-    return file
+    return docs.parent / "fidelity" / f"{room}.json"
 
 
-def _write(results: dict[str, RoomResult], every: list[str], given: argparse.Namespace) -> None:
-    """Write the docs, with the other rooms as they were last judged, or say why not."""
-    others = [name for name in every if name not in results]
-    never = [name for name in others if not _kept(given, name).exists()]
-    if not given.write or _is_partial(given) or never:
-        why = (
-            "not asked to (--write)"
-            if not given.write
-            else "not all contestants were judged"
-            if _is_partial(given)
-            else f"never judged here: {', '.join(never)}"
-        )
-        print(f"writes no docs: {why}", flush=True)
-        return
-    whole = results | {name: saved(_kept(given, name)) for name in others}
-    report.write([whole[name] for name in every], _sheets(given), given.write)
-    print(
-        f"wrote {given.write}"
-        + (f", as they were last judged: {', '.join(others)}" if others else ""),
-        flush=True,
-    )
+def _write(every: list[str], given: argparse.Namespace) -> None:
+    """Write the docs, each room as it was last judged."""
+    kept = [file for name in every if (file := _kept(given.write, name)).exists()]
+    report.write([saved(file) for file in kept], given.write)
+    print(f"wrote {given.write}: {', '.join(file.stem for file in kept)}", flush=True)
 
 
 def _sheets(given: argparse.Namespace) -> Path:
-    """Where pictures side by side are kept."""
-    folder: Path = given.scratch / "sheets"
-    return folder
+    """Where pictures side by side are put."""
+    docs: Path | None = given.write
+    return docs.parent / "pictures" if docs else Path(given.scratch) / "sheets"
 
 
 def _judged(room: BenchRoom, given: argparse.Namespace) -> RoomResult:

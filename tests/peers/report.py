@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -85,23 +84,19 @@ def _shown(key: str, value: float | None) -> str:
     return f"{value:.{digits + (key in ('ssim', 'normal_agreement'))}f}"
 
 
-def write(results: Sequence[RoomResult], sheets: Path, file: Path) -> None:
-    """Rewrite the section of a Markdown file, and the pictures in ``pictures/`` beside it.
+def write(results: Sequence[RoomResult], file: Path) -> None:
+    """Rewrite the section of a Markdown file.
 
     Args:
-        results: Of all rooms.
-        sheets: The folder in which their sheets lie.
+        results: Of all rooms; their sheets lie in ``pictures/`` beside the file.
         file: The Markdown.
     """
-    pictures = file.parent / "pictures"
-    pictures.mkdir(exist_ok=True)
     parts = [PREAMBLE, "### What was asked\n", ASKED, aims_table(results)]
     for result in results:
         parts.append(f"### {result.room}\n")
         parts += [f"{result.about}\n"] if result.about else []
         parts.append(table(result))
         for sheet in result.sheets:
-            shutil.copyfile(sheets / sheet.file, pictures / sheet.file)
             parts.append(f"{', '.join(sheet.names)}:\n\n![{result.room}](pictures/{sheet.file})\n")
     parts.append(_cleaning(results))
     parts.append(_tries(results))

@@ -394,9 +394,9 @@ def test_aims_hold_or_fall_short() -> None:
 
 def test_the_report_shows_scores_refusals_and_pictures(tmp_path: Path) -> None:
     views = {name: np.full((54, 96, 3), 90, np.uint8) for name in ("truth", "published", PEER)}
-    sheet = report.side_by_side(views, tmp_path / "sheets" / "fidelity-hall-0.webp")
+    sheet = report.side_by_side(views, tmp_path / "pictures" / "fidelity-hall-0.webp")
     shown = dataclasses.replace(result(0.91, 0.9), sheets=(sheet,))
-    report.write([shown], tmp_path / "sheets", tmp_path / "benchmarks.md")
+    report.write([shown], tmp_path / "benchmarks.md")
     told = (tmp_path / "benchmarks.md").read_text(encoding="utf-8")
     assert "| f_score_5mm | 0.9100 |  | 0.7000 | 0.8000 | 0.9000 |" in told
     assert "the best method is `signed-distance`" in told
@@ -435,7 +435,7 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., st
 
 
 def test_a_run_of_one_room_keeps_the_others(command: Callable[..., str]) -> None:
-    assert command("--room", "a") == "", "the others were never judged"
+    assert command("--room", "a").count("0.5000") == 1, "the other was never judged"
     assert command().count("0.5000") == 2
     told = command("--room", "b", score=0.75)
     assert told.count("0.5000") == 1
@@ -447,5 +447,5 @@ def test_a_run_of_some_methods_writes_nothing(
 ) -> None:
     before = command()
     assert command("--method", "poisson", score=0.75) == before
-    assert "writes no docs: not all contestants were judged" in capsys.readouterr().out
+    assert "writes no docs: not all contestants are judged" in capsys.readouterr().out
     assert command("--room", "a").count("0.5000") == 2, "nor is it kept"
