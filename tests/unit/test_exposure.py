@@ -87,30 +87,53 @@ def test_groups_of_stations_that_see_nothing_in_common_keep_their_own_mean() -> 
     assert found[:, 0] == pytest.approx(np.exp([0.05, -0.05, 0.1, -0.1, 0.0]))
 
 
-def test_glare_gives_way_to_a_station_that_is_not_dazzled() -> None:
-    """A lamp hangs before the wall; each station sees it in front of another place."""
+LAMP = np.array([1.0, 1.0, 0.8])
+AROUND = np.array([[0.0, 1.0, 1.6], [2.0, 1.0, 1.6], [1.0, 0.0, 1.6]])
+"""Stations that see the lamp before different places of the wall."""
+
+
+def lamplit(gain: np.ndarray) -> tuple[PointCloud, np.ndarray]:
+    """The wall behind a lamp, as three cameras of those gains see it; which points are dazzled."""
     places, station = wall(200_000)
-    lamp = np.array([1.0, 1.0, 0.8])
-    stations = np.array([[0.0, 1.0, 1.6], [2.0, 1.0, 1.6], [1.0, 0.0, 1.6]])
     rng = np.random.default_rng(4)
     globe = rng.normal(size=(3000, 3))
-    places = np.concatenate([places, lamp + 0.1 * globe / np.linalg.norm(globe, axis=1)[:, None]])
+    globe = LAMP + 0.1 * globe / np.linalg.norm(globe, axis=1)[:, None]
+    places = np.concatenate([places, globe]).astype(np.float32)
     station = np.concatenate([station, rng.integers(0, 3, 3000).astype(np.int16)])
     clean = painted(places)
     clean[-3000:] = 255
-    way = places - stations[station]
-    toward = lamp - stations[station]
+    way, toward = places - AROUND[station], LAMP - AROUND[station]
     lengths = np.linalg.norm(way, axis=1) * np.linalg.norm(toward, axis=1)
     angle = np.degrees(np.arccos(np.clip((way * toward).sum(1) / lengths, -1, 1)))
-    dazzled = clean + 340 * np.exp(-((angle / 4) ** 2))[:, None]
-    cloud = cloud_of(places.astype(np.float32), dazzled, station)
-    even = exposure(cloud, stations, Settings())
+    shown = np.minimum(clean + 340 * np.exp(-((angle / 4) ** 2))[:, None], 255)
+    return cloud_of(places, shown * gain[station], station), shown[:, 0] - clean[:, 0] > 40
+
+
+@pytest.mark.parametrize("ends_at", [255, 247, 243])
+def test_glare_gives_way_to_a_station_that_is_not_dazzled(ends_at: int) -> None:
+    """A camera that clips below 255, by its white balance, burns out all the same."""
+    cloud, dazzled = lamplit(np.full((3, 1), ends_at / 255))
+    even = exposure(cloud, AROUND, Settings())
     on_wall = even.points[:, 2] == 0
-    off = np.abs(even.colors[on_wall] - painted(even.points[on_wall])).max(1)
-    assert (np.abs(dazzled - clean).max(1) > 40).sum() > 3000
-    assert (off > 40).sum() < 30
+    clean = painted(even.points[on_wall]) * ends_at / 255
+    assert dazzled.sum() > 1000
+    assert (np.abs(even.colors[on_wall] - clean).max(1) > 40).sum() < 30
     assert on_wall.sum() > 180_000
     assert (~on_wall).sum() == 3000  # the lamp itself shines for every station
+
+
+def test_what_only_a_dazzled_station_saw_takes_the_colours_about_it() -> None:
+    cloud, dazzled = lamplit(np.ones((3, 1)))
+    unseen = (cloud.station != 0) & (cloud.points[:, 2] == 0) & (cloud.points[:, 0] > 1.85)
+    even = exposure(cloud.take(~unseen), AROUND, Settings())
+    lone = ~unseen & (cloud.points[:, 0] > 1.9)  # beyond the cells that another one sees in part
+    stays = even.points[:, 0] > 1.9
+    assert np.array_equal(even.points[stays], cloud.points[lone])
+    worst = dazzled[lone]
+    assert worst.sum() > 100
+    clean = painted(even.points[stays])[worst]
+    before = np.abs(cloud.colors[lone][worst] - clean).mean()
+    assert np.abs(even.colors[stays][worst] - clean).mean() < before / 3
 
 
 @pytest.mark.parametrize("owner", [-1, 0])

@@ -34,7 +34,7 @@ __all__ = [
     "vistas",
 ]
 
-VERSION = 6
+VERSION = 7
 
 
 def bake(

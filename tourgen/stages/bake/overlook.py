@@ -18,7 +18,9 @@ has a wrong pose or another room's picture, and is left out.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -26,9 +28,11 @@ import numpy.typing as npt
 from tourgen.geometry import Float32, Float64, Mesh, Panorama, UInt8
 from tourgen.stages.bake.points import ColorIndex
 from tourgen.stages.bake.vista import Vista, directions, is_whole, smooth
+from tourgen.stages.burnt import burnt_out
 from tourgen.stages.exposure import solve_gains
 
 Bool = npt.NDArray[np.bool_]
+Value = TypeVar("Value", bound=np.generic)
 
 _WIDEST_DEPTH = 2048
 _JUMP = 0.01  # second difference of 1 / range, relative, per pixel
@@ -41,6 +45,7 @@ _SAMPLE_M = 0.04  # means of so much are compared: single pixels differ by JPEG'
 _LEAST_SAMPLES = 200
 _GLARE_PX = 8
 _LAMP_PX = 3  # of the depth buffer: smaller specks are paint, made brighter by JPEG's ripples
+_RIPPLES_LEVEL = 2  # of the pyramid: there JPEG's ripples do not reach beyond the camera's end
 _SURE = 0.9
 
 
@@ -49,14 +54,12 @@ class VistaSettings:
     """What of a picture is used.
 
     Attributes:
-        burnt: A value of all three channels that is burnt out.
-        glare_deg: How far glare reaches about it.
+        glare_deg: How far glare reaches about what is burnt out.
         glare_trust: Trust in the middle of glare, for places that nothing else shows.
         tones: Darkest and brightest value that tells a gain.
         correlation: Least agreement of a picture's tones with the points'.
     """
 
-    burnt: int = 250
     glare_deg: float = 12.0
     glare_trust: float = 0.01
     tones: tuple[int, int] = (20, 245)
@@ -103,8 +106,9 @@ def _vista(panorama: Panorama, scene: object, settings: VistaSettings) -> Vista:
     blank = _blank(panorama.image)
     trust = _edge_trust(range_m, is_whole(panorama))
     trust *= _resized(_distance_trust(blank), size)
-    trust *= _glare_trust(panorama, size, settings)
-    return Vista(panorama, _pyramid(panorama.image, blank), np.ones(3), range_m, trust)
+    pyramid = _pyramid(panorama.image, blank)
+    trust *= _glare_trust(panorama, pyramid, size, settings)
+    return Vista(panorama, pyramid, np.ones(3), range_m, trust)
 
 
 def _ranges(scene: object, position: Float64, way: Float32) -> Float32:
@@ -151,20 +155,22 @@ def _distance_trust(blank: Bool) -> Float32:
     return smooth(distance_transform_edt(~blank).astype(np.float32), 4.0, 4.0 + _FADE_PX)
 
 
-def _resized(values: Float32, size: tuple[int, int]) -> Float32:
+def _resized(values: npt.NDArray[Value], size: tuple[int, int]) -> npt.NDArray[Value]:
     """Nearest values on a grid of (width, height)."""
     rows = (np.arange(size[1]) + 0.5) * values.shape[0] / size[1]
     columns = (np.arange(size[0]) + 0.5) * values.shape[1] / size[0]
     return values[np.ix_(rows.astype(int), columns.astype(int))]
 
 
-def _glare_trust(panorama: Panorama, size: tuple[int, int], settings: VistaSettings) -> Float32:
+def _glare_trust(
+    panorama: Panorama, pyramid: Sequence[UInt8], size: tuple[int, int], settings: VistaSettings
+) -> Float32:
     """Low about burnt-out directions; on a coarse grid, as glare has no edges."""
     from scipy.ndimage import binary_opening, zoom
     from scipy.spatial import cKDTree
 
-    bright = _resized(panorama.image.min(2), size) >= settings.burnt
-    burnt = binary_opening(bright, np.ones((_LAMP_PX, _LAMP_PX), bool))
+    burnt = _resized(burnt_out(pyramid[min(_RIPPLES_LEVEL, len(pyramid) - 1)]), size)
+    burnt = binary_opening(burnt, np.ones((_LAMP_PX, _LAMP_PX), bool))
     if not burnt.any():
         return np.ones(size[::-1], np.float32)
     seeds = np.unique(np.rint(directions(panorama, *size)[burnt] * 100), axis=0) / 100
