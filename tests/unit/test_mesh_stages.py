@@ -210,6 +210,18 @@ def test_crumbs_doubles_and_overfull_edges_go() -> None:
     assert len(clean.faces) >= len(ball.faces) - 1
 
 
+def test_a_short_rod_is_no_crumb_but_a_ball_of_its_area_is() -> None:
+    ball = trimesh.creation.icosphere(3, 1.0)
+    rod = trimesh.creation.cylinder(0.01, 0.15).apply_translation([3, 0, 0])
+    fleck = trimesh.creation.icosphere(2, 0.028).apply_translation([0, 3, 0])
+    assert fleck.area == pytest.approx(rod.area, rel=0.1)
+    all_of_it = trimesh.util.concatenate([ball, rod, fleck])
+    mesh = Mesh(np.zeros(3), np.float32(all_of_it.vertices), np.int32(all_of_it.faces))
+    clean = hygiene.hygiene(mesh, hygiene.Settings())
+    assert len(clean.faces) == len(ball.faces) + len(rod.faces)
+    assert clean.vertices[:, 0].max() > 3
+
+
 def test_only_crumbs_is_an_error() -> None:
     ball = trimesh.creation.icosphere(1, 0.01)
     with pytest.raises(StageError, match="only crumbs"):
