@@ -42,6 +42,17 @@ class PointCloud:
         """The points that ``index`` (a mask or positions) selects."""
         return PointCloud(self.origin, self.points[index], self.colors[index], self.station[index])
 
+    def joined(self, other: PointCloud) -> PointCloud:
+        """The points, then those of another cloud of the same origin."""
+        if not len(other):
+            return self
+        return PointCloud(
+            self.origin,
+            np.concatenate([self.points, other.points]),
+            np.concatenate([self.colors, other.colors]),
+            np.concatenate([self.station, other.station]),
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class OrientedCloud:

@@ -220,7 +220,7 @@ def test_the_floor_goes_on_below_a_tripod() -> None:
     disc_m2 = np.pi * (1.5 * np.tan(np.radians(30))) ** 2
     assert len(new) * 0.03**2 == pytest.approx(disc_m2, rel=0.1)
     assert (laid.normals[len(bare.cloud) :] == [0, 0, 1]).all()
-    assert (laid.cloud.station[len(bare.cloud) :] == -1).all()
+    assert (laid.cloud.station[len(bare.cloud) :] == floor.LAID).all()
 
 
 def test_no_floor_is_laid_where_something_stands_or_nothing_is_level() -> None:

@@ -153,7 +153,8 @@ def baked(
 ) -> tuple[TexturedMesh, ...]:
     """Bake each tile's picture from the full cloud, and from panoramas where there are any."""
     finest_m = min(each.texel_m for each in unwrapped_tiles)
-    index = bake.color_index(cloud, oriented, finest_m)
+    unseen = bake.continued_floors(cloud, oriented, simplified.finest, settings)
+    index = bake.color_index(cloud.joined(unseen), oriented, finest_m)
     panoramas = moved(scan.panoramas, joined)
     vistas = bake.vistas(panoramas, simplified.finest, index, bake.VistaSettings())
     return tuple(bake.bake(each, index, settings, vistas) for each in unwrapped_tiles)

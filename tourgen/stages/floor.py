@@ -16,7 +16,9 @@ from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, OrientedCloud, PointCloud
 
-VERSION = 1
+VERSION = 2
+LAID = -2
+"""The station of points that nobody measured."""
 _SECTORS = 16
 _MIN_UPRIGHT = 0.9
 _STANDING_M = 0.5
@@ -49,7 +51,7 @@ def floor(oriented: OrientedCloud, settings: Settings) -> OrientedCloud:
         settings: See ``Settings``.
 
     Returns:
-        The same points, then those laid: of no station, grey; colours are baked from the scan.
+        The same points, then those laid, grey: their colours are found when the rest has its own.
     """
     points = oriented.cloud.points
     upright = points[oriented.normals[:, 2] > _MIN_UPRIGHT]
@@ -60,12 +62,9 @@ def floor(oriented: OrientedCloud, settings: Settings) -> OrientedCloud:
         if (disc := _disc(upright, station, settings)) is not None
     ]
     new = np.concatenate([np.empty((0, 3), np.float32), *laid])
-    cloud = PointCloud(
-        oriented.cloud.origin,
-        np.concatenate([points, new]),
-        np.concatenate([oriented.cloud.colors, np.full(new.shape, 128, np.uint8)]),
-        np.concatenate([oriented.cloud.station, np.full(len(new), -1, np.int16)]),
-    )
+    grey = np.full(new.shape, 128, np.uint8)
+    unseen = PointCloud(oriented.cloud.origin, new, grey, np.full(len(new), LAID, np.int16))
+    cloud = oriented.cloud.joined(unseen)
     up = np.broadcast_to(np.array([0, 0, 1], np.float32), new.shape)
     return OrientedCloud(cloud, np.concatenate([oriented.normals, up]), oriented.stations)
 

@@ -5,7 +5,8 @@ blend depends on the place alone, not on the chart or tile that the texel lies i
 run through seams. Points are averaged in cells that double in size from level to level: a
 coarse tile reads the level that fits its texels, which keeps it free of aliasing, and a texel
 that no scan supports reads the first coarser level that has something to tell, so that holes
-take the colours about them, across charts and tiles alike.
+take the colours about them, across charts and tiles alike; those of floors were given points
+before, which continue the floor's picture.
 
 A million texels take 2 to 3 s on one busy core. Tried and rejected: a neighbour search and a
 dense blend at each texel instead of one search for every 2 x 2 of a chart, 3.5 s; filling holes
@@ -17,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from tourgen.geometry import TexturedMesh, UvMesh
+from tourgen.stages.bake.floors import continued_floors
 from tourgen.stages.bake.overlook import VistaSettings, vistas
 from tourgen.stages.bake.pictures import of_pictures
 from tourgen.stages.bake.points import ColorIndex, Settings, color_index, of_points
@@ -31,6 +33,7 @@ __all__ = [
     "VistaSettings",
     "bake",
     "color_index",
+    "continued_floors",
     "vistas",
 ]
 
