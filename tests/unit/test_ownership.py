@@ -40,6 +40,18 @@ def test_each_point_finds_its_station(merged):
     assert (found.station == station).mean() > 0.99
 
 
+def test_steps_finer_than_the_place_is_known_are_found():
+    rng = np.random.default_rng(3)
+    scans = [measured(PLACES[0], 12.3, 0.1, rng), measured(PLACES[1], 51.7, 0.15, rng)]
+    points = np.concatenate(scans).astype(np.float32)
+    station = np.repeat([0, 1], [len(scan) for scan in scans])
+    kept = rng.permutation(len(points))[: int(0.2 * len(points))]
+    far_off = np.array([[-0.10, 0.11, 0.08], [0.09, 0.10, -0.04]])
+    found = ownership(points[kept], PLACES + far_off, Settings())
+    assert np.linalg.norm(found.stations - PLACES, axis=1).max() < 0.0001
+    assert (found.station == station[kept]).mean() > 0.99
+
+
 def test_averaged_points_have_no_owner(merged):
     points, _ = merged
     order, starts = voxel_groups(points, 0.15)
