@@ -125,19 +125,11 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         version=sift.VERSION,
         libraries=("scipy",),
     )
-    cleaned = task(
-        "exposure",
-        points.exposed,
-        sifted,
-        joined,
-        settings=exposure.Settings(),
-        version=exposure.VERSION,
-    )
-    spaced = task("spacing", spacing.spacing, cleaned, version=spacing.VERSION)
+    spaced = task("spacing", points.spaced, sifted, version=spacing.VERSION)
     thinned = task(
         "thin",
         points.thinned,
-        cleaned,
+        sifted,
         spaced,
         settings=points.Thinning(detail_mm, room.clean.thin_mm),
         version=thin.VERSION,
@@ -156,7 +148,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         task(
             "mesh",
             partial(surface.mended, room, folder),
-            cleaned,
+            sifted,
             settings=surface.Mended(room.mesh, room.unit, room.up),
             digests=(digests[folder / room.mesh],),
             version=1,
@@ -178,7 +170,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         surface.trimmed,
         found,
         oriented,
-        cleaned,
+        sifted,
         spaced,
         settings=surface.trimming(room),
         version=trim.VERSION,
@@ -209,11 +201,19 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         version=tiles.VERSION,
         libraries=("fast-simplification",),
     )
+    lit = task(
+        "exposure",
+        points.exposed,
+        sifted,
+        joined,
+        settings=exposure.Settings(),
+        version=exposure.VERSION,
+    )
     unwrapped = task(
         "unwrap",
         picture.unwrapped,
         tree,
-        cleaned,
+        lit,
         scanned,
         settings=picture.Texels(room.texture.texel_mm),
         version=unwrap.VERSION,
@@ -224,7 +224,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         picture.baked,
         unwrapped,
         oriented,
-        cleaned,
+        lit,
         scanned,
         joined,
         simplified,
@@ -236,7 +236,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         "inferred",
         picture.guessed,
         unwrapped,
-        cleaned,
+        sifted,
         joined,
         spaced,
         settings=surface.Detail(detail_mm),
@@ -276,7 +276,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         "measure",
         surface.measured,
         simplified,
-        cleaned,
+        sifted,
         joined,
         spaced,
         settings=surface.Detail(detail_mm),
@@ -287,13 +287,12 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         "summary",
         picture.summarised,
         scanned,
-        cleaned,
         joined,
         sifted,
         found,
         tree,
         files,
-        version=3,
+        version=4,
     )
     scan_mb = sum((folder / each.file).stat().st_size for each in room.scans) / 1e6
     return RoomRecipe(room, scan_mb, files, pictured, entered, measured, summary)

@@ -12,6 +12,7 @@ from sampled import cloud, flat, sphere
 from tourgen.errors import InputError, StageError
 from tourgen.fitting import surface
 from tourgen.geometry import PointCloud
+from tourgen.stages.sift import Sifted
 from tourgen.stages.spacing import Spacing
 from tourgen.tour import Room, Surface
 
@@ -79,7 +80,7 @@ def test_only_what_closes_gaps_is_opened_again(method: str, opens: bool) -> None
 
 def mended(folder: Path, name: str, given: PointCloud, **keys: object) -> surface.Drawn:
     room = Room.model_validate({"id": "r", "scans": ["a.ply"], "mesh": name, **keys}, context=None)
-    return surface.mended(room, folder, given, surface.Mended(name, room.unit, room.up))
+    return surface.mended(room, folder, Sifted(given, {}), surface.Mended(name, room.unit, room.up))
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".stl", ".glb"])

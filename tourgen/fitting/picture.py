@@ -151,7 +151,7 @@ def baked(
     simplified: levels.Levels,
     settings: bake.Settings,
 ) -> tuple[TexturedMesh, ...]:
-    """Bake each tile's picture from the full cloud, and from panoramas where there are any."""
+    """Bake each tile's picture from all points, and from panoramas where there are any."""
     finest_m = min(each.texel_m for each in unwrapped_tiles)
     unseen = bake.continued_floors(cloud, oriented, simplified.finest, settings)
     index = bake.color_index(cloud.joined(unseen), oriented, finest_m)
@@ -162,7 +162,7 @@ def baked(
 
 def guessed(
     unwrapped_tiles: tuple[UvMesh, ...],
-    cloud: PointCloud,
+    kept: sift.Sifted,
     joined: register.Registered,
     spacing: Spacing,
     asked: Detail,
@@ -170,7 +170,7 @@ def guessed(
     """Which vertices of each tile no measurement stands behind."""
     vertices = tuple(each.mesh.vertices for each in unwrapped_tiles)
     settings = inferred.Settings(detail_m(spacing, asked.detail_mm))
-    return inferred.inferred(vertices, cloud, joined.stations, settings)
+    return inferred.inferred(vertices, kept.cloud, joined.stations, settings)
 
 
 def packed(
@@ -215,7 +215,6 @@ def pictured(
 
 def summarised(
     scan: RoomScan,
-    cloud: PointCloud,
     joined: register.Registered,
     kept: sift.Sifted,
     found: Drawn,
@@ -228,7 +227,7 @@ def summarised(
         scan.cloud.origin,
         np.stack([vertices.min(axis=0), vertices.max(axis=0)]),
         scan.facts,
-        len(cloud),
+        len(kept.cloud),
         joined.stations,
         joined.moved_mm,
         kept.removed,

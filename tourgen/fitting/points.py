@@ -17,7 +17,7 @@ from tourgen.fitting.plausible import require_room
 from tourgen.geometry import Float64, OrientedCloud, Panorama, PointCloud
 from tourgen.scans import ReadFacts, read_panoramas, read_room, without_repeats
 from tourgen.stages import exposure, floor, normals, ownership, register, sift, stations, thin
-from tourgen.stages.spacing import Spacing
+from tourgen.stages.spacing import Spacing, spacing
 from tourgen.tour import Room, open_scans
 
 _SPACING_MM = (0.1, 1000.0)
@@ -139,7 +139,7 @@ def sifted(joined: register.Registered, settings: sift.Settings) -> sift.Sifted:
 def exposed(
     kept: sift.Sifted, joined: register.Registered, settings: exposure.Settings
 ) -> PointCloud:
-    """Bring the stations' colours into agreement."""
+    """Bring the stations' colours into agreement, and drop those in glare."""
     return exposure.exposure(kept.cloud, joined.stations, settings)
 
 
@@ -158,7 +158,12 @@ def moved(panoramas: tuple[Panorama, ...], joined: register.Registered) -> tuple
     return tuple(out)
 
 
-def thinned(cloud: PointCloud, spacing: Spacing, asked: Thinning) -> PointCloud:
+def spaced(kept: sift.Sifted) -> Spacing:
+    """Estimate how far apart the points lie."""
+    return spacing(kept.cloud)
+
+
+def thinned(kept: sift.Sifted, spacing: Spacing, asked: Thinning) -> PointCloud:
     """Thin to half the detail, so that each cell of the octree keeps several points.
 
     A scan denser than the detail is thinned further, toward a point a cell: each is the mean of
@@ -174,6 +179,7 @@ def thinned(cloud: PointCloud, spacing: Spacing, asked: Thinning) -> PointCloud:
             f"middle, found {spacing_mm:.2g} mm",
             "check the export and `unit`",
         )
+    cloud = kept.cloud
     most_mm = 100 * float(np.ptp(cloud.points, axis=0).max())
     if asked.detail_mm and asked.detail_mm > most_mm:
         raise InputError(

@@ -10,10 +10,11 @@ from scipy.spatial import cKDTree
 
 from tourgen.errors import InputError
 from tourgen.fitting.lengths import Corner, corners, detail_m, support_m
-from tourgen.geometry import Float64, Mesh, OrientedCloud, PointCloud
+from tourgen.geometry import Float64, Mesh, OrientedCloud
 from tourgen.scans import Frame, read_mesh
 from tourgen.stages import inferred, levels, measure, register, trim
 from tourgen.stages.mesh_arrays import vertex_normals
+from tourgen.stages.sift import Sifted
 from tourgen.stages.spacing import Spacing
 from tourgen.stages.surface import auto, ball_pivoting, crust, poisson, signed_distance
 from tourgen.tour import Room
@@ -170,7 +171,7 @@ def trimming(room: Room) -> Trimming:
 
 
 def trimmed(
-    found: Drawn, oriented: OrientedCloud, cloud: PointCloud, spacing: Spacing, asked: Trimming
+    found: Drawn, oriented: OrientedCloud, kept: Sifted, spacing: Spacing, asked: Trimming
 ) -> Mesh:
     """Open the openings."""
     mesh = found.mesh
@@ -180,7 +181,7 @@ def trimmed(
         (_from_origin(low, mesh.origin), _from_origin(high, mesh.origin))
         for low, high in asked.closed
     )
-    return trim.trim(mesh, oriented, cloud, trim.Settings(support_m(spacing), closed=closed))
+    return trim.trim(mesh, oriented, kept.cloud, trim.Settings(support_m(spacing), closed=closed))
 
 
 def _from_origin(corner: Corner, origin: Float64) -> Corner:
@@ -188,13 +189,13 @@ def _from_origin(corner: Corner, origin: Float64) -> Corner:
     return x, y, z
 
 
-def mended(room: Room, folder: Path, cloud: PointCloud, asked: Mended) -> Drawn:
+def mended(room: Room, folder: Path, kept: Sifted, asked: Mended) -> Drawn:
     """Take a surface made elsewhere; the settings are those of the room, for the key.
 
     Raises:
         InputError: It is no mesh, or lies elsewhere than the scan.
     """
-    frame = Frame.of(room.unit_m, room.up)
+    frame, cloud = Frame.of(room.unit_m, room.up), kept.cloud
     mesh = read_mesh(folder / asked.file, asked.file, frame, cloud.origin)
     sample = cloud.points[:: max(1, len(cloud) // _SAMPLE)]
     away, _ = cKDTree(mesh.vertices[mesh.faces].mean(axis=1)).query(sample, workers=-1)
@@ -214,11 +215,11 @@ def levelled(mesh: Mesh, spacing: Spacing, asked: Detail) -> levels.Levels:
 
 def measured(
     simplified: levels.Levels,
-    cloud: PointCloud,
+    kept: Sifted,
     joined: register.Registered,
     spacing: Spacing,
     asked: Detail,
 ) -> measure.Quality:
     """Compare the finest mesh with the scan."""
     settings = inferred.Settings(detail_m(spacing, asked.detail_mm))
-    return measure.measure(simplified.finest, cloud, joined.stations, settings)
+    return measure.measure(simplified.finest, kept.cloud, joined.stations, settings)
