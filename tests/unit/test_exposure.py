@@ -61,6 +61,22 @@ def test_colours_of_all_stations_agree_after_it() -> None:
     assert np.abs(off).max() < 2.5
 
 
+def test_what_one_camera_clipped_is_as_bright_as_the_others_saw_it() -> None:
+    """A third of the wall is too bright for one camera; half of that no other one sees."""
+    places, station = wall(120_000)
+    clean = np.full((len(places), 3), 120.0) + 40 * np.sin(7 * places[:, :1])
+    clean[places[:, 0] > 1.3] = 228
+    gain = np.array([[0.95], [1.0], [1.3]])
+    cloud = cloud_of(places, clean * gain[station], station)
+    lone = (places[:, 0] > 1.3) & (places[:, 1] > 1.0)
+    even = exposure(cloud.take(~lone | (station == 2)), STATIONS, Settings())
+    bright = even.points[:, 0] > 1.35
+    seen = even.colors[bright & (even.points[:, 1] < 0.95) & (even.station < 2)].mean()
+    for part in (even.points[:, 1] < 0.95, even.points[:, 1] > 1.05):
+        told = even.colors[bright & part & (even.station == 2)].mean()
+        assert told == pytest.approx(seen, abs=1.5)
+
+
 def test_a_remnant_of_unknown_station_joins_the_others() -> None:
     cloud = exposed_wall()
     station = cloud.station.copy()

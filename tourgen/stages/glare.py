@@ -1,0 +1,192 @@
+"""Glare: what a lamp lays over the picture of a camera that it burns out.
+
+Stations see the same lamp before other things, so that between them nearly all is told: points
+that lie about burnt-out directions and are brighter than what another station saw at their place
+are dropped. By how much they are brighter, degree by degree off the lamp, says where the rest is
+dazzled that no other station saw: it takes the colours about it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from tourgen.geometry import Float32, Float64, PointCloud, UInt8
+from tourgen.stages.burnt import burnt_out
+from tourgen.stages.station_cells import cells_of
+
+Bool = npt.NDArray[np.bool_]
+Int64 = npt.NDArray[np.int64]
+
+_DIRECTION_DEG = 1.0
+_TOUCHING_CELLS = 2.5
+_SURROUNDING_POINTS = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How glare is told.
+
+    Attributes:
+        reach_deg: How far it reaches about a burnt-out direction.
+        cell_m: Edge of the cells in which stations are compared.
+        cell_points: Fewest points of a station in a cell.
+        brighter: By how much such a cell is brighter than another station's, at the least.
+        ring_cells: So many cells, at the least, tell the glare at one angle off a lamp.
+        dazzled: How much brighter cells so far off the lamp have to be, in the middle, for those
+            that no other station saw to take the colours about them.
+        lamp_m: What two stations see burnt out so near to one another is a lamp.
+    """
+
+    reach_deg: float = 12.0
+    cell_m: float = 0.04
+    cell_points: int = 3
+    brighter: float = 3.0
+    ring_cells: int = 10
+    dazzled: float = 5.0
+    lamp_m: float = 0.25
+
+
+def without_glare(
+    even: PointCloud, measured: UInt8, stations: Float64, settings: Settings
+) -> PointCloud:
+    """The points without glare, where another station tells better.
+
+    Args:
+        even: n points in colours of one exposure.
+        measured: (n, 3) sRGB, their colours before.
+        stations: (s, 3) metres from the cloud's origin.
+        settings: See there.
+
+    Returns:
+        The points in their order, less those in glare; those that are dazzled and that no other
+        station saw have the colours about them.
+    """
+    burnt = _burnt(measured, even.station, len(stations))
+    lamps = _near_lamps(even.points, burnt, even.station, settings)
+    spots = _about_burnt(even, burnt, stations, settings)
+    glared, dazzled = _glared(even, spots, lamps, settings)
+    _take_surroundings(even, dazzled, ~(glared | dazzled))
+    return even.take(~glared) if glared.any() else even
+
+
+def _burnt(colors: UInt8, station: npt.NDArray[np.int16], count: int) -> Bool:
+    """(n,) where a station's camera burnt out."""
+    burnt = np.zeros(len(colors), bool)
+    for number in range(count):
+        own = station == number
+        burnt[own] = burnt_out(colors[own])
+    return burnt
+
+
+@dataclass(frozen=True, slots=True)
+class _About:
+    """Which burnt-out spot of its station's picture a point lies about.
+
+    Attributes:
+        spot: (n,) number, -1 for none. Directions that touch are one spot of one station.
+        off_deg: (n,) angle to its middle, whole degrees.
+    """
+
+    spot: Int64
+    off_deg: Int64
+
+
+def _about_burnt(cloud: PointCloud, burnt: Bool, stations: Float64, settings: Settings) -> _About:
+    about = _About(np.full(len(cloud), -1), np.zeros(len(cloud), np.int64))
+    reach = 2 * np.sin(np.radians(settings.reach_deg) / 2) / np.radians(_DIRECTION_DEG)
+    spots = 0
+    for number, station in enumerate(stations):
+        own = np.flatnonzero(cloud.station == number)
+        if not burnt[own].any():
+            continue
+        way = cloud.points[own] - station.astype(np.float32)
+        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
+        steps = np.rint(way / np.radians(_DIRECTION_DEG)).astype(np.int64) + 128
+        key, place = np.unique(
+            (steps[:, 0] * 256 + steps[:, 1]) * 256 + steps[:, 2], return_inverse=True
+        )
+        cells = np.stack([key >> 16, key >> 8 & 255, key & 255], axis=1).astype(np.float32)
+        seeds = cKDTree(cells[np.unique(place[burnt[own]])])
+        _, nearest = seeds.query(cells, distance_upper_bound=reach)
+        touching = seeds.sparse_distance_matrix(seeds, _TOUCHING_CELLS)
+        found, spot = connected_components(touching, directed=False)
+        spot_of = np.append(spot, -1)[nearest][place]
+        middles = np.stack(
+            [np.bincount(spot, axis, found) / np.bincount(spot) for axis in seeds.data.T - 128], 1
+        )
+        middles /= np.linalg.norm(middles, axis=1, keepdims=True)
+        cosine = (way * middles[spot_of].astype(np.float32)).sum(1)
+        about.off_deg[own] = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+        about.spot[own] = np.where(spot_of < 0, -1, spot_of + spots)
+        spots += found
+    return about
+
+
+def _glared(cloud: PointCloud, burnt: _About, lamps: Bool, settings: Settings) -> tuple[Bool, Bool]:
+    """(n,) points too bright for their place, and those that are it unseen by other stations."""
+    glared, dazzled = np.zeros((2, len(cloud)), bool)
+    near = burnt.spot >= 0
+    if not near.any():
+        return glared, dazzled
+    low = cloud.points[near].min(0) - settings.cell_m
+    high = cloud.points[near].max(0) + settings.cell_m
+    about = (cloud.station >= 0) & ((cloud.points >= low) & (cloud.points <= high)).all(1)
+    count = int(cloud.station.max()) + 1
+    cells = cells_of(cloud.points[about], cloud.station[about], count, settings.cell_m)
+    shade = cells.means(cloud.colors[about]).mean(1)
+    enough = cells.sizes >= settings.cell_points
+    firsts = np.flatnonzero(np.diff(cells.cell, prepend=-1))
+    groups = np.diff(firsts, append=len(cells.cell))
+    least = np.repeat(np.minimum.reduceat(np.where(enough, shade, np.inf), firsts), groups)
+    told = np.repeat(np.add.reduceat(enough.astype(np.int64), firsts), groups) - enough > 0
+    suspect = cells.means(near[about][:, None])[:, 0] > 0.5
+    glared[about] = cells.of_points(suspect & (shade > least + settings.brighter))
+    first = cells.order[cells.starts]
+    spot, ring = burnt.spot[about][first], burnt.off_deg[about][first]
+    dark = ~lamps[about][first] & (spot >= 0)
+    compared = np.flatnonzero(suspect & dark & told & enough)
+    excess = np.zeros((int(spot.max(initial=0)) + 1, int(ring.max(initial=0)) + 1))
+    key = spot[compared] * excess.shape[1] + ring[compared]
+    for each, cells_there in zip(*np.unique(key, return_counts=True), strict=True):
+        if cells_there >= settings.ring_cells:
+            of = compared[key == each]
+            excess.flat[each] = np.median(shade[of] - least[of])
+    # Glare only fades: what is nearer the lamp's middle is dazzled at least as much.
+    excess = np.maximum.accumulate(excess[:, ::-1], axis=1)[:, ::-1]
+    alone = suspect & dark & ~told & (excess[spot, ring] > settings.dazzled)
+    dazzled[about] = cells.of_points(alone)
+    return glared, dazzled
+
+
+def _near_lamps(
+    points: Float32, burnt: Bool, station: npt.NDArray[np.int16], settings: Settings
+) -> Bool:
+    """(n,) points at what at least two stations saw burnt out."""
+    near = np.zeros(len(points), bool)
+    if not burnt.any():
+        return near
+    at, owner = points[burnt], station[burnt]
+    trees = {each: cKDTree(at[owner == each]) for each in np.unique(owner)}
+    reach = settings.lamp_m
+    shared = np.zeros(len(at), bool)
+    for each, tree in trees.items():
+        others = owner != each
+        shared[others] |= np.isfinite(tree.query(at[others], distance_upper_bound=reach)[0])
+    if shared.any():
+        lamps = cKDTree(at[shared])
+        near = np.isfinite(lamps.query(points, distance_upper_bound=reach)[0])
+    return near
+
+
+def _take_surroundings(cloud: PointCloud, some: Bool, sound: Bool) -> None:
+    """Give some points the mean colour of the sound ones next to them; in place."""
+    if some.any() and sound.any():
+        _, near = cKDTree(cloud.points[sound]).query(
+            cloud.points[some], k=np.arange(1, min(_SURROUNDING_POINTS, int(sound.sum())) + 1)
+        )
+        cloud.colors[some] = np.rint(cloud.colors[sound][near].mean(1)).astype(np.uint8)

@@ -1,0 +1,61 @@
+"""Small cells of a room, station by station, so that what stations saw there can be compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from tourgen.geometry import Float32, Float64
+
+Bool = npt.NDArray[np.bool_]
+Int64 = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """Points sorted into groups of one cell and one station, the groups of a cell in a row.
+
+    Attributes:
+        order: (n,) positions of the points, group after group.
+        starts: (g,) where each group begins.
+        sizes: (g,)
+        cell: (g,) number of the group's cell.
+        owner: (g,) its station.
+    """
+
+    order: Int64
+    starts: Int64
+    sizes: Int64
+    cell: Int64
+    owner: Int64
+
+    def means(self, values: npt.NDArray[np.generic]) -> Float64:
+        """(g, k) mean of (n, k) values by group."""
+        columns = [
+            np.add.reduceat(column[self.order].astype(np.float32), self.starts, dtype=np.float64)
+            for column in values.T
+        ]
+        return np.stack(columns, axis=1) / self.sizes[:, None]
+
+    def of_points(self, values: Bool) -> Bool:
+        """(n,) each point's group's value."""
+        spread = np.empty(len(self.order), bool)
+        spread[self.order] = np.repeat(values, self.sizes)
+        return spread
+
+
+def cells_of(points: Float32, owner: npt.NDArray[np.int16], count: int, cell_m: float) -> Cells:
+    """Sort n points of ``count`` owners into cells."""
+    if not len(points):
+        none = np.zeros(0, np.int64)
+        return Cells(none, none, none, none, none)
+    at = np.floor((points - points.min(0)) / cell_m).astype(np.int64)
+    span = at.max(0) + 1
+    key = ((at[:, 0] * span[1] + at[:, 1]) * span[2] + at[:, 2]) * count + owner
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    starts = np.flatnonzero(np.diff(key, prepend=-1))
+    cell, of = np.divmod(key[starts], count)
+    return Cells(order, starts, np.diff(starts, append=len(key)), cell, of)
