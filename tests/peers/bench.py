@@ -13,13 +13,13 @@ import orientation
 import registration
 from browsing import photographed, published
 from contestants import CHAINS, Contestant
-from drawing import Camera, draw, relief
+from drawing import Camera, draw, relief, splatted
 from gaps import Gaps
 from ledger import Ledger, digest
 from picture_score import fitted_gain, score_pictures
 from planes import Creases, Flatness, Rails, model_rods
 from plaque import EDGES_MM, plaque_view, read_board
-from rooms import GALLERY, BenchRoom, stamp
+from rooms import GALLERY, BenchRoom, read_scan, stamp
 from seams import seam_figures
 from surface_score import Figures, Reference, Samples, surface_figures
 from true_picture import Shot, TexturedTruth, busiest, cameras_in, true_shots
@@ -137,6 +137,18 @@ class Bench:
 
         name = one.digest if one else "truth"
         return self.ledger.pictures(f"relief-{name}-{self.truth_digest}", take)[0]
+
+    def dots(self) -> list[UInt8]:
+        """The scan as it came, from the room's cameras, and from the plaque's after them."""
+        cameras = list(self.cameras)
+        if self.room.id in EDGES_MM:
+            cameras.append(plaque_view(self.room.id)[0])
+
+        def take() -> list[UInt8]:
+            points, colors = read_scan(self.room.scan)
+            return [splatted(points, colors, camera) for camera in cameras]
+
+        return self.ledger.pictures(f"scan-{stamp(self.room.scan)}", take)
 
     @cached_property
     def cameras(self) -> tuple[Camera, ...]:

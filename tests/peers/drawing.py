@@ -114,6 +114,32 @@ def draw(
     return _encoded(light)
 
 
+def splatted(
+    points: Float32,
+    colors: UInt8,
+    camera: Camera,
+    size: tuple[int, int] = SIZE,
+    void: tuple[int, int, int] = (205, 216, 224),
+) -> UInt8:
+    """(h, w, 3) what a camera sees of a cloud, each point a dot of 2 x 2 pixels."""
+    width, height = size
+    cast = camera.rays(size)[..., 3:].astype(np.float64)
+    corner, right, down = cast[0, 0], cast[0, 1] - cast[0, 0], cast[1, 0] - cast[0, 0]
+    # A point lies along a ray: way = depth * (corner + column * right + row * down).
+    ahead = np.linalg.inv(np.stack([corner, right, down], axis=1))
+    depth, column, row = ((points - camera.position) @ ahead.T).T
+    before = np.flatnonzero(depth > 0)
+    before = before[np.argsort(-depth[before], kind="stable")]
+    picture = np.full((height, width, 3), void, np.uint8)
+    for right_px, down_px in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        x = np.floor(column[before] / depth[before]).astype(np.int64) + right_px
+        y = np.floor(row[before] / depth[before]).astype(np.int64) + down_px
+        seen = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+        # The last of several values for one pixel stays: that of the nearest point.
+        picture[y[seen], x[seen]] = colors[before[seen]]
+    return picture
+
+
 def _encoded(light: Float32) -> UInt8:
     """sRGB values of light 0 to 1."""
     curve = 1.055 * np.maximum(light, 0) ** (1 / 2.4) - 0.055

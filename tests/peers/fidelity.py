@@ -196,7 +196,7 @@ def _pictured(
         print(f"{room}: pictures of {name} ...", flush=True)
         columns[name] = one, figures | bench.picture(one, budget)
         shown[name] = bench.pictures(one, budget)
-    shown = {"truth": bench.true_pictures(), **shown}
+    shown = {"scan": bench.dots(), "truth": bench.true_pictures(), **shown}
     numbers = [
         *bench.busiest[: report.SHOWN_CAMERAS],
         *range(len(bench.shots), len(shown["truth"])),

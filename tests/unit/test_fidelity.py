@@ -26,7 +26,7 @@ import sections
 import surface_score
 import thinned
 import variants
-from drawing import Camera, draw, vertex_colored
+from drawing import Camera, draw, splatted, vertex_colored
 from gaps import Gaps
 from rooms import BenchRoom
 from true_picture import Shot
@@ -291,6 +291,25 @@ def test_a_section_is_rewritten_alone(tmp_path: Path) -> None:
     sections.rewrite(file, "One", "third")
     told = file.read_text(encoding="utf-8")
     assert told == "# Benchmarks\n\n## One\n\nthird\n\n## Two\n\nsecond\n\n### Part\n\nmore\n"
+
+
+def test_points_are_dots_where_the_surface_is_drawn_and_the_nearer_hides() -> None:
+    camera = Camera(np.array([-1.0, 0.5, 1.2]), np.array([2.0, -0.3, 1.0]))
+    rng = np.random.default_rng(0)
+    wall = np.column_stack([np.full(200_000, 2.0), rng.uniform(-2, 2, (200_000, 2)) / (1, 2)])
+    wall[:, 2] += 1.25
+    places = np.concatenate([wall, wall / 2 + camera.position / 2 * (1, 1, 1)]).astype(np.float32)
+    hues = np.repeat(np.array([[200, 30, 30], [30, 30, 200]], np.uint8), len(wall), axis=0)
+    far = splatted(places[: len(wall)], hues[: len(wall)], camera, (96, 54))
+    near = splatted(places, hues, camera, (96, 54))
+    shown = (far == hues[0]).all(axis=2)
+    faces = np.array([[0, 1, 3], [0, 3, 2]], np.int32)
+    corners = np.array([[2.0, y, z] for z in (0.25, 2.25) for y in (-2.0, 2.0)])
+    paint = vertex_colored(np.tile(hues[:1], (4, 1)), faces)
+    drawn = (draw(ray_scene(corners, faces), paint, camera, (96, 54)) == hues[0]).all(axis=2)
+    assert (shown != drawn).mean() < 0.05
+    assert 0.2 < drawn.mean() < 0.95
+    assert (near[shown] == hues[-1]).all(), "halfway to the eye the same directions are covered"
 
 
 def test_a_method_is_drawn_in_the_tours_cache_from_its_cleaned_points(
