@@ -65,6 +65,24 @@ def test_one_colour_fills_every_texel_and_the_background(
     assert (texture == color).all()
 
 
+def test_an_edge_aslant_to_the_grid_of_points_has_no_teeth() -> None:
+    grid = np.stack(np.meshgrid(*[np.arange(100) / 100 + 0.005] * 2), -1).reshape(-1, 2)
+    points = np.column_stack([grid, np.zeros(len(grid))])
+    across = np.array([np.sin(np.radians(25)), np.cos(np.radians(25)), 0])
+
+    def beyond_m(places: np.ndarray) -> np.ndarray:
+        return places @ across - 0.6
+
+    light = beyond_m(points) > 0
+    cloud = scanned(points, np.where(light[:, None], 210, 40).repeat(3, axis=1))
+    places, colors = seen(baked(cloud, texel_m=0.002))
+    inner = (np.abs(places[:, :2] - 0.5) < 0.45).all(1)
+    shade, off_m = colors[inner, 0], beyond_m(places[inner])
+    wrong = (shade > 125) != (off_m > 0)
+    assert np.abs(off_m[wrong]).max() < 0.004
+    assert wrong[np.abs(off_m) < 0.004].mean() < 0.165  # 0.183 of a round bell
+
+
 def test_stripes_as_wide_as_three_points_stay_apart() -> None:
     grid = np.stack(np.meshgrid(*[np.arange(200) / 200 + 0.0025] * 2), -1).reshape(-1, 2)
     points = np.column_stack([grid, np.zeros(len(grid))])

@@ -37,7 +37,7 @@ __all__ = [
     "vistas",
 ]
 
-VERSION = 7
+VERSION = 8
 
 
 def bake(
