@@ -28,8 +28,9 @@ from tourgen.geometry import Float32, Float64, Int32
 
 VERSION = 2
 """Raised when a recipe changes, so that cached meshes are made again."""
-LIMIT_S = 3600
-"""A peer that takes more of the processor is stopped, and the table says so."""
+LIMIT_S = 900
+"""A peer that takes more of the processor, thrice what a whole tour takes us, is stopped, and the
+table says so."""
 
 Mesh = tuple[Float64, Int32]
 
