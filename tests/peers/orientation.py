@@ -34,7 +34,7 @@ from tourgen.fitting import points as fitting
 from tourgen.geometry import Float32, Float64, PointCloud
 from tourgen.scans import open_scan, read_room
 from tourgen.simulation.light import ray_scene, rays_of
-from tourgen.stages import normals, sift, spacing, stations
+from tourgen.stages import normals, sift, stations
 from tourgen.stages.tangent import tangent_planes
 from tourgen.tour import Room, load_tour, open_scans
 
@@ -105,9 +105,9 @@ def _raw_points(path: Path) -> Float32:
 def prepared(room: Room, folder: Path) -> tuple[PointCloud, Float32]:
     """The cloud that a build estimates normals of, and the cleaned one that stations show in."""
     cloud, _, _ = read_room(open_scans(room, folder), room.keep, room.remove)
-    cleaned = sift.sift(cloud, np.empty((0, 3)), sift.Settings()).cloud
+    kept = sift.sift(cloud, np.empty((0, 3)), sift.Settings())
     thinning = fitting.Thinning(room.surface.detail_mm, room.clean.thin_mm)
-    return fitting.thinned(cleaned, spacing.spacing(cleaned), thinning), cleaned.points
+    return fitting.thinned(kept, fitting.spaced(kept), thinning), kept.cloud.points
 
 
 def figures(points: Float32, found: Float32, truth: Truth) -> dict[str, float]:
