@@ -1,0 +1,154 @@
+"""Ownership: which station measured each point of a merged cloud, and where exactly it stood.
+
+A merged cloud has lost its stations, but not their traces. A scanner sends its beams on a grid
+that is regular in azimuth and elevation, and range noise moves a point along its beam only: seen
+from the place of its own station, a point lies on the grid to a thousandth of a degree; seen from
+anywhere else, it lies anywhere. Points dropped at random leave the grid as it is; only averaging
+destroys it, and then nothing is found and nothing is claimed.
+
+From a place known to some centimetres the search goes in steps, each as sharp as the next one
+needs. *Frequency*: the spectrum of elevations within small windows of like range, where a wrong
+place shifts all points alike. *Place*: climb where those windows, each for itself, are most
+regular. *Phase*: climb where all windows agree on one grid; that tells the place to some
+hundredths of a millimetre, and the scanner's tilt.
+
+On the demo's merged scans, from the blind discs found in the floor (up to 15 cm off)
+and, on the stair, from places rounded to centimetres: 99.6, 100.0 and 99.96 % of the points
+come back to their station, of the second chamber at full size, with steps of 0.1 degrees, 99.9 %;
+8 s of one core a station.
+
+Tried and rejected: the spectrum over the whole circle instead of windows: a place 5 mm off
+already blurs it, and ten stations on a stair drown it; windows of 5 degrees alone: a place 15 cm
+off blurs the steps that are finer than a quarter of a degree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from tourgen.geometry import Float32, Float64
+from tourgen.stages.ownership.grid import Grid, fitted, polished
+from tourgen.stages.ownership.settings import Settings
+from tourgen.stages.ownership.windows import (
+    HIGHEST_DEG,
+    Windows,
+    agreeing,
+    angles,
+    climbed,
+    rough,
+    windows_about,
+)
+
+__all__ = ["VERSION", "Ownership", "Settings", "ownership"]
+
+VERSION = 4
+_BLOCK = 1_000_000
+_ABOUT_M = 0.03
+"""How uncertain a place is that was found by its blind disc."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ownership:
+    """What the grids tell.
+
+    Attributes:
+        station: (n,) int16, the station that measured each point; -1 throughout where that
+            cannot be told.
+        stations: (s, 3) float64, their places, metres; as given where no grid was found.
+    """
+
+    station: npt.NDArray[np.int16]
+    stations: Float64
+
+
+def ownership(points: Float32, stations: Float64, settings: Settings) -> Ownership:
+    """Find the grids of stations in a merged cloud.
+
+    Args:
+        points: (n, 3) metres, z up, as merged: not averaged.
+        stations: (s, 3) metres, known to some centimetres.
+        settings: See ``Settings``.
+
+    Returns:
+        The stations' exact places where the grid of each is found, else those given; and the owner
+        of each point where moreover nearly all points lie on a grid. The few that lie on none
+        follow the nearest that does.
+    """
+    rng = np.random.default_rng(0)
+    nobody = np.full(len(points), -1, np.int16)
+    found = []
+    for place in stations:
+        grid = _grid(points, place, settings, rng)
+        if grid is None:
+            return Ownership(nobody, stations)
+        found.append(grid)
+    if not found:
+        return Ownership(nobody, stations)
+    places = np.array([grid.place for grid in found])
+    owner = _nearest_grid(points, found, settings.most_off)
+    known = owner >= 0
+    if known.mean() < settings.least_matched:
+        return Ownership(nobody, places)
+    if not known.all():
+        _, near = cKDTree(points[known]).query(points[~known], workers=-1)
+        owner[~known] = owner[known][near]
+    return Ownership(owner, places)
+
+
+def _nearest_grid(points: Float32, grids: list[Grid], most_off: float) -> npt.NDArray[np.int16]:
+    """Number of the grid that each point lies on, -1 where it lies on none."""
+    owner = np.full(len(points), -1, np.int16)
+    for start in range(0, len(points), _BLOCK):
+        block = points[start : start + _BLOCK]
+        best = np.full(len(block), most_off, np.float32)
+        for number, grid in enumerate(grids):
+            off = grid.off(block)
+            nearer = off < best
+            best[nearer] = off[nearer]
+            owner[start : start + _BLOCK][nearer] = number
+    return owner
+
+
+def _grid(
+    points: Float32, place: Float64, settings: Settings, rng: np.random.Generator
+) -> Grid | None:
+    """The grid of the station near a place, or None."""
+    tries: list[tuple[float, int, Windows, Float64, float]] = []
+    for number, window_deg in enumerate(settings.windows_deg):
+        windows = windows_about(points, place, window_deg, settings, rng)
+        if windows is not None:
+            there, frequency, answer = rough(windows, place, window_deg, settings)
+            tries.append((answer, number, windows, there, frequency))
+            if answer >= settings.clear_answer:
+                break
+    if not tries:
+        return None
+    answer, number, windows, place, frequency = max(tries, key=lambda each: each[0])
+    if answer < settings.least_answer:
+        return None
+    narrowest_deg = settings.windows_deg[number]
+    for window_deg in settings.windows_deg[number::-1]:
+        about_m = _ABOUT_M * narrowest_deg / window_deg
+        place, frequency = climbed(windows, place, frequency, window_deg, about_m)
+        windows = windows_about(points, place, window_deg, settings, rng)
+        if windows is None:
+            return None
+    place, frequency = agreeing(windows, place, frequency)
+    fits = fitted(windows, place, frequency)
+    if max(agreement for _, agreement in fits) < settings.least_agreement / np.sqrt(
+        len(windows.points)
+    ):
+        return None
+    sample = points[rng.permutation(len(points))[: settings.polish_points]]
+    sample = sample[np.abs(angles(sample, place)[0]) < HIGHEST_DEG]
+    grids = [polished(grid, sample, settings) for grid, _ in fits]
+    grids = [grid for grid in grids if grid.is_as_fine_as(settings.step_deg)]
+    return max(
+        grids,
+        key=lambda grid: int((grid.off(sample) < settings.most_off / 4).sum()),
+        default=None,
+    )
