@@ -32,6 +32,7 @@ _ROOM_POINTS = 400_000
 _RIM_M = 0.03
 _FAR_M = 0.15
 _SAME_M = 0.03
+_BESIDE = 4.0  # spacings: farther from a picture's points it has a gap
 _SAME_SHARE = 0.6
 _OFFSETS_M = np.arange(-0.08, 0.081, 0.02)
 
@@ -122,18 +123,36 @@ def reflections(
         mirror = _outlined(*glass, np.concatenate(crossing))
         if mirror is None:
             continue
+        shown: list[tuple[npt.NDArray[np.int64], Float32]] = []
         for each in seen:
             hidden = mirror.hides(each.station, points[each.index], behind_m)
             # Another station may have measured a wall there, where it is not told which did.
             hidden &= each.told | (cluster[each.index] > 0)
             fresh = each.index[hidden & each.told]
             fresh = fresh[~gone[fresh]]
-            moved.append(fresh)
-            onto.append(mirror.crossing(each.station, points[fresh]).astype(np.float32))
+            shown.append((fresh, mirror.crossing(each.station, points[fresh]).astype(np.float32)))
             gone[each.index[hidden]] = True
+        for numbers, places in _one_picture(shown):
+            moved.append(numbers)
+            onto.append(places)
     at = np.concatenate(moved)
     gone[at] = False
     return Reflections(gone, at, np.concatenate(onto))
+
+
+def _one_picture(
+    shown: list[tuple[npt.NDArray[np.int64], Float32]],
+) -> Iterator[tuple[npt.NDArray[np.int64], Float32]]:
+    """Of what stations saw in a mirror, points and places, the fullest, and what it lacks."""
+    taken = np.empty((0, 3), np.float32)
+    for numbers, places in sorted(shown, key=lambda each: -len(each[0])):
+        if len(taken) > 1 and len(places):
+            tree = cKDTree(taken)
+            apart_m = _BESIDE * float(np.median(tree.query(taken, k=[2])[0]))
+            lacks = np.isinf(np.asarray(tree.query(places, distance_upper_bound=apart_m)[0]))
+            numbers, places = numbers[lacks], places[lacks]
+        taken = np.concatenate([taken, places])
+        yield numbers, places
 
 
 def _apart(
