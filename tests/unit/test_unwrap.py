@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import multiprocessing
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -166,3 +168,21 @@ def test_texels_grow_where_a_picture_would_exceed_the_largest() -> None:
 def test_no_face_is_an_error() -> None:
     with pytest.raises(StageError, match="at least 1 face, found 0"):
         unwrap(mesh(np.zeros((3, 3)), np.zeros((0, 3))), Settings(TEXEL_M))
+
+
+def _unwrap_slivers(count: int) -> None:
+    flat = sheet(1.0, 1.0, 40)
+    at = np.arange(count) % (len(flat.vertices) - 1)
+    slivers = np.stack([at, at, at + 1], axis=1)
+    tile = mesh(flat.vertices, np.concatenate([flat.faces, slivers]))
+    assert len(unwrap(tile, Settings(TEXEL_M)).mesh.faces) == len(flat.faces) + count
+
+
+def test_thousands_of_faces_without_area_come_to_an_end() -> None:
+    """A root of the demo at full size holds 1,559: xatlas never ended."""
+    worker = multiprocessing.get_context("spawn").Process(target=_unwrap_slivers, args=(2000,))
+    worker.start()
+    worker.join(60)
+    ended = worker.exitcode
+    worker.kill()
+    assert ended == 0

@@ -249,9 +249,11 @@ def _placed(flat: Float64, owner: Int64, faces: Int64, padding: int) -> tuple[in
     """
     import xatlas
 
-    # It skips faces without area: those share a triangle of one texel, the last chart.
+    # It skips faces without area: for those stands one triangle of a texel, the last chart. Given
+    # for each of them, a thousand times the same, it never came to an end.
     spot = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    proxy = np.where(faces < 0, len(flat) + np.arange(3), faces)
+    shown = faces[faces[:, 0] >= 0]
+    proxy = np.concatenate([shown, len(flat) + np.arange(3)[None]]) if (faces < 0).any() else shown
     chart = np.append(owner, np.full(3, owner.max()))[proxy[:, 0]]
     atlas = xatlas.Atlas()
     atlas.add_uv_mesh(
