@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from surfaces import oriented, sheet
 
 from tourgen.geometry import OrientedCloud, PointCloud
@@ -52,6 +53,15 @@ def test_the_fourth_arm_of_a_cross_is_drawn_after_the_other_three() -> None:
     off = np.abs(filled(picture, hole) - picture)[hole].max(1)
     assert (picture[hole] == DARK).mean() > 0.1
     assert (off > 60).mean() < 0.06
+
+
+@pytest.mark.parametrize("side", [20, 75, 161])
+def test_a_hole_may_reach_the_edge_of_the_picture(side: int) -> None:
+    picture = chequered(np.stack(np.meshgrid(*[np.arange(side)] * 2), axis=-1), 5)
+    hole = np.zeros((side, side), bool)
+    hole[-side // 5 :, -side // 3 :] = hole[: side // 6, side // 3 : side // 2] = True
+    whole = filled(picture, hole)
+    assert (np.abs(whole - picture)[hole].max(1) > 60).mean() < 0.4
 
 
 def test_what_touches_nothing_known_stays() -> None:

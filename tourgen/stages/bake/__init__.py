@@ -37,7 +37,7 @@ __all__ = [
     "vistas",
 ]
 
-VERSION = 8
+VERSION = 9
 
 
 def bake(

@@ -32,6 +32,7 @@ _COARSEST_PX = 80
 _ROUNDS = 5
 _LAST_ROUNDS = 2
 _STEPS = (1, 4, 1)
+_BORDER = max(_RADIUS, *_STEPS)  # no patch and no step leads out of a picture
 _MOSTLY = 3  # of four pixels, for the pixel that they make to be known
 _NOISE = 0.02**2  # squared difference that says nothing, of 1
 _LEAST_TRUST = np.float32(1e-6)
@@ -53,7 +54,7 @@ def continued(picture: Float32, known: Bool, hole: Bool) -> tuple[Float32, Bool]
     """
     height, width = known.shape
     octaves = max(0, int(np.log2(max(height, width) / _COARSEST_PX)))
-    margin = _RADIUS << octaves
+    margin = _BORDER << octaves
     side = -(-(max(height, width) + 2 * margin) >> octaves) << octaves
     around = ((margin, side - margin - height), (margin, side - margin - width))
     levels = [
@@ -79,7 +80,7 @@ def continued(picture: Float32, known: Bool, hole: Bool) -> tuple[Float32, Bool]
 
 @dataclass(frozen=True, slots=True)
 class _Level:
-    """A square picture, with a border of at least a patch's radius that is neither.
+    """A square picture, with a border of ``_BORDER`` at least that is neither.
 
     Attributes:
         picture: (n, n, 3) 0 to 1; its holes are written.
