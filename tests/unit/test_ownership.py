@@ -88,3 +88,13 @@ def test_no_station_no_owner(merged):
 def test_few_points_have_no_owner():
     points = np.random.default_rng(0).normal(size=(50, 3)).astype(np.float32)
     assert (ownership(points, PLACES, Settings()).station == -1).all()
+
+
+def test_a_few_points_on_a_grid_by_chance_move_no_station(merged):
+    """Narrow windows of few points are regular somewhere; that is no scanner's grid."""
+    points, _ = merged
+    few = points[::30]
+    places = np.array([[0.4, -1.3, 0.9], [-0.75, -1.72, 0.67], [0.9, 1.5, 1.2]])
+    found = ownership(few, places, Settings())
+    assert (found.station == -1).all()
+    assert (found.stations == places).all()

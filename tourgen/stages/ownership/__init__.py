@@ -45,7 +45,7 @@ from tourgen.stages.ownership.windows import (
 
 __all__ = ["VERSION", "Ownership", "Settings", "ownership"]
 
-VERSION = 4
+VERSION = 5
 _BLOCK = 1_000_000
 _ABOUT_M = 0.03
 """How uncertain a place is that was found by its blind disc."""
@@ -147,8 +147,6 @@ def _grid(
     sample = sample[np.abs(angles(sample, place)[0]) < HIGHEST_DEG]
     grids = [polished(grid, sample, settings) for grid, _ in fits]
     grids = [grid for grid in grids if grid.is_as_fine_as(settings.step_deg)]
-    return max(
-        grids,
-        key=lambda grid: int((grid.off(sample) < settings.most_off / 4).sum()),
-        default=None,
-    )
+    shares = [float((grid.off(sample) < settings.most_off / 4).mean()) for grid in grids]
+    best = int(np.argmax(shares)) if shares else -1
+    return grids[best] if shares and shares[best] >= settings.least_share else None
