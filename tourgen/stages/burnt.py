@@ -1,4 +1,8 @@
-"""Burnt out: where a camera gave all that it can give."""
+"""Burnt out: where a camera gave all that it can give.
+
+White balance scales a channel that was clipped before: it ends below 255, though hardly below
+235, where nothing needs to have burnt out.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +15,13 @@ _WITHIN = 5
 _LOWEST_END = 235
 
 
+def ends(colors: UInt8) -> UInt8:
+    """(3,) the highest value of each channel of (..., 3) sRGB of one camera, at least 235."""
+    return np.asarray(colors.reshape(-1, 3).max(0, initial=_LOWEST_END), np.uint8)
+
+
 def burnt_out(colors: UInt8) -> npt.NDArray[np.bool_]:
     """Where all three channels of a picture are at their end.
-
-    White balance scales a channel that was clipped before: it ends below 255, though hardly below
-    235, where nothing needs to have burnt out.
 
     Args:
         colors: (..., 3) sRGB of one camera.
@@ -23,5 +29,4 @@ def burnt_out(colors: UInt8) -> npt.NDArray[np.bool_]:
     Returns:
         (...) mask.
     """
-    ends = np.maximum(colors.reshape(-1, 3).max(0, initial=0), _LOWEST_END).astype(np.int16)
-    return np.asarray((colors >= ends - _WITHIN).all(-1))
+    return np.asarray((colors >= ends(colors) - _WITHIN).all(-1))

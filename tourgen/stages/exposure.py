@@ -25,6 +25,7 @@ from scipy.sparse.csgraph import connected_components
 
 from tourgen.geometry import Float32, Float64, PointCloud, UInt8
 from tourgen.stages import glare
+from tourgen.stages.burnt import ends
 from tourgen.stages.station_cells import cells_of
 
 VERSION = 3
@@ -35,7 +36,6 @@ Int64 = npt.NDArray[np.int64]
 _HUBER = 2.0  # standard errors
 _ROUNDS = 20
 _LEAST_ERROR = 5e-4  # of a pair's log ratio, however many cells tell it
-_LOWEST_END = 235  # no white balance lowers a channel's end further
 _CLIPPED_SHARE = (0.1, 0.9)  # of a cell's points: below, it is not, above, it is
 
 
@@ -125,8 +125,8 @@ def _raise_clipped(
 
 def _clipped(colors: UInt8, owner: npt.NDArray[np.int16], count: int) -> Bool:
     """(n, 3) the values at the end of their station's channel, if it reaches far enough up."""
-    ends = np.stack([colors[owner == k].max(0, initial=_LOWEST_END) for k in range(count)])
-    return np.asarray(colors >= ends[owner])
+    highest = np.stack([ends(colors[owner == k]) for k in range(count)])
+    return np.asarray(colors >= highest[owner])
 
 
 def gains(
