@@ -25,7 +25,7 @@ from surface_score import Figures, Reference, Samples, surface_figures
 from true_picture import Shot, TexturedTruth, busiest, cameras_in, true_shots
 
 from tourgen.geometry import UInt8
-from tourgen.simulation.light import ray_scene
+from tourgen.rays import ray_scene
 from tourgen.stages import normals, ownership, register, sift, stations
 from tourgen.tour import load_tour
 

@@ -31,9 +31,9 @@ from scipy.spatial import cKDTree
 from score import Truth, load, spread
 
 from tourgen.geometry import Float64, PointCloud
+from tourgen.rays import ray_scene
 from tourgen.scans import open_scan, read_room
 from tourgen.simulate import VERSION
-from tourgen.simulation.light import ray_scene
 from tourgen.stages import ownership, register, sift, stations
 from tourgen.tour import load_tour
 

@@ -19,7 +19,7 @@ from score import LOWEST, Truth
 from surface_score import Figures
 
 from tourgen.geometry import Float64, Int32
-from tourgen.simulation.light import ray_scene, rays_of
+from tourgen.rays import ray_scene, rays_of
 
 TRUE_M = 0.020
 """A disc is laid where it truly lies where the mesh is so near to it."""

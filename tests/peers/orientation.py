@@ -32,8 +32,8 @@ from scipy.spatial import cKDTree
 
 from tourgen.fitting import points as fitting
 from tourgen.geometry import Float32, Float64, PointCloud
+from tourgen.rays import ray_scene, rays_of
 from tourgen.scans import open_scan, read_room
-from tourgen.simulation.light import ray_scene, rays_of
 from tourgen.stages import normals, sift, stations
 from tourgen.stages.tangent import tangent_planes
 from tourgen.tour import Room, load_tour, open_scans

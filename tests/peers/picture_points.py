@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from score import Truth, markdown
 
 from tourgen.geometry import Float32, Float64, Int32, TexturedMesh, UInt8
-from tourgen.simulation.light import rays_of
+from tourgen.rays import rays_of
 
 SAMPLES = 50_000
 PIXEL_M = 0.005

@@ -24,7 +24,7 @@ from score import Truth
 from surface_score import Bools, Figures, Samples, face_normals
 
 from tourgen.geometry import Float64, Int32
-from tourgen.simulation.light import ray_scene, rays_of
+from tourgen.rays import ray_scene, rays_of
 
 Ints = npt.NDArray[np.int64]
 

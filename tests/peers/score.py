@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from sections import rewrite
 
 from tourgen.geometry import Float64, Int32
-from tourgen.simulation.light import ray_scene, rays_of
+from tourgen.rays import ray_scene, rays_of
 
 _HEADING = "The published surface"
 _PREAMBLE = """Made by `make bench` from the demo. Accuracy: how far the published surface lies

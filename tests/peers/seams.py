@@ -27,7 +27,7 @@ from surface_score import Figures
 from true_picture import Shot, TexturedTruth
 
 from tourgen.geometry import Float64, Int32, UInt8
-from tourgen.simulation.light import ray_scene
+from tourgen.rays import ray_scene
 
 RUN_PX = 8
 REST_PX = 2

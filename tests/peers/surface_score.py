@@ -11,7 +11,7 @@ import numpy.typing as npt
 from score import Truth, spread
 
 from tourgen.geometry import Float64, Int32
-from tourgen.simulation.light import ray_scene
+from tourgen.rays import ray_scene
 
 LIMITS_MM = (2, 5, 10)
 NEAR_M = 0.010

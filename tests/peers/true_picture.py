@@ -15,7 +15,7 @@ from drawing import SIZE, Camera, draw, tensor, textured
 from rooms import BenchRoom
 
 from tourgen.geometry import Float32, Float64, Int32, UInt8
-from tourgen.simulation.light import ray_scene
+from tourgen.rays import ray_scene
 
 VERSION = 1
 """Raised when cameras or rendering change, so that stored pictures are made again."""

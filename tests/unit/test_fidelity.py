@@ -31,7 +31,7 @@ from gaps import Gaps
 from rooms import BenchRoom
 from true_picture import Shot
 
-from tourgen.simulation.light import ray_scene
+from tourgen.rays import ray_scene
 from tourgen.tour import load_tour
 
 CORNERS = np.array(

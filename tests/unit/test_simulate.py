@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float64
+from tourgen.rays import ray_scene, rays_of
 from tourgen.simulate import FULL_POINTS, MODELS, Size, simulate_room
 from tourgen.simulation import furniture, scanner, stairs
 from tourgen.simulation import materials as look
@@ -24,7 +25,6 @@ from tourgen.simulation.charts import (
     sheet,
     wall_surface,
 )
-from tourgen.simulation.light import ray_scene, rays_of
 from tourgen.simulation.model import ChartMesh, Lamp, PlacedOpening, RoomModel, join
 
 POINTS = 60_000

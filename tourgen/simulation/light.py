@@ -13,6 +13,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from tourgen.geometry import Float32, Float64
+from tourgen.rays import ray_scene, rays_of
 from tourgen.simulation.charts import Bools, Chart
 from tourgen.simulation.model import ChartMesh, Lamp, PlacedOpening
 
@@ -28,27 +29,6 @@ SKY = {
     "door": np.array([0.42, 0.34, 0.25]),
 }
 SUN = np.array([9.0, 7.4, 5.2])
-
-
-def ray_scene(vertices: Float64, faces: Any) -> Any:
-    """Open3D's ray casting scene of one mesh."""
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(
-        o3d.core.Tensor(np.ascontiguousarray(vertices, dtype=np.float32)),
-        o3d.core.Tensor(np.ascontiguousarray(faces, dtype=np.uint32)),
-    )
-    return scene
-
-
-def rays_of(origins: Float64 | Float32, directions: Float64 | Float32) -> Any:
-    """(n, 6) float32 tensor of rays."""
-    import open3d as o3d
-
-    packed = np.empty((len(origins), 6), dtype=np.float32)
-    packed[:, :3], packed[:, 3:] = origins, directions
-    return o3d.core.Tensor(packed)
 
 
 def illuminate(

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.geometry import Float32, Float64, UInt8
+from tourgen.rays import ray_scene, rays_of
 from tourgen.simulation.atlas import encode, sample
 from tourgen.simulation.charts import Bools
-from tourgen.simulation.light import ray_scene, rays_of
 from tourgen.simulation.model import RoomModel, TrueRoom, join
 
 SURFACE, MIXED, STRAY, GHOST, PASSER_BY = range(5)

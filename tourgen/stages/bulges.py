@@ -20,6 +20,7 @@ from scipy.sparse import csr_array, eye_array
 from scipy.sparse.linalg import splu
 
 from tourgen.geometry import Float32, Float64, Int32, Mesh
+from tourgen.rays import ray_scene, rays_of
 from tourgen.stages.free_space import FreeSpace
 from tourgen.stages.mesh_arrays import edges, vertex_areas, vertex_normals
 
@@ -111,12 +112,9 @@ def _way_back(mesh: Mesh, at: Int64, free: FreeSpace, apart_m: float) -> Float64
     NaN where it comes upon the mesh before, or would come to rest less than ``apart_m`` in front
     of it, or never leaves.
     """
-    import open3d as o3d
-
     start, way = mesh.vertices[at], -vertex_normals(mesh)[at]
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(mesh.vertices, mesh.faces.astype(np.uint32))
-    rays = np.concatenate([start + _STEP_M / 4 * way, way], axis=1)
+    rays = rays_of(start + _STEP_M / 4 * way, way)
+    scene = ray_scene(mesh.vertices, mesh.faces)
     through_m = scene.cast_rays(rays)["t_hit"].numpy() + _STEP_M / 4
     back_m = np.full(len(at), np.nan)
     going = np.arange(len(at))

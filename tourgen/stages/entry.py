@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.geometry import Float64, Mesh, View
+from tourgen.rays import ray_scene, rays_of
 
 VERSION = 2
 _STEP_M = 0.5
@@ -44,10 +45,7 @@ def entry_view(mesh: Mesh, stations: Float64, settings: Settings) -> View:
         stations: (s, 3) metres from the mesh's origin; may be empty.
         settings: See ``Settings``.
     """
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(mesh.vertices, mesh.faces.astype(np.uint32))
+    scene = ray_scene(mesh.vertices, mesh.faces)
     for least_around in (_ENCLOSED, 0.05):  # scans of a part of a room are open on most sides
         for places in (stations, _grid(mesh)):
             eyes = _eyes(scene, places, settings.eye_m)
@@ -116,7 +114,6 @@ def _eyes(scene: Any, places: Float64, eye_m: float) -> Float64:
 
 def _cast(scene: Any, start: Float64, direction: Float64) -> tuple[Float64, npt.NDArray[np.bool_]]:
     """Distance to what (n, 3) rays hit, and whether they hit its front."""
-    rays = np.concatenate([start, direction], axis=1).astype(np.float32)
-    hit = scene.cast_rays(rays)
+    hit = scene.cast_rays(rays_of(start, direction))
     front = np.einsum("ij,ij->i", hit["primitive_normals"].numpy(), direction) < 0
     return hit["t_hit"].numpy().astype(np.float64), front

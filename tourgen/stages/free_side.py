@@ -34,6 +34,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64
+from tourgen.rays import ray_scene, rays_of
 from tourgen.stages.tangent import across
 from tourgen.stages.thin import voxel_groups
 
@@ -100,8 +101,6 @@ def _rays(
     What meets nothing came from behind a wall, or left through a window; mostly the former. The
     back of what is known tells nothing: a board of which one side was scanned hides free space.
     """
-    import open3d as o3d
-
     rng = np.random.default_rng(0)
     u, v = across(normal)
     source = np.repeat(np.arange(len(place)), _RAYS)
@@ -114,7 +113,7 @@ def _rays(
         way = flat * (np.cos(turn) * u[source] + np.sin(turn) * v[source])
         way += side * np.sqrt(1 - square) * normal[source]
         start = place[source] + np.float32(0.5 * side * patch_m) * normal[source]
-        answer = scene.cast_rays(o3d.core.Tensor(np.concatenate([start, way], axis=1)))
+        answer = scene.cast_rays(rays_of(start, way))
         reach = answer["t_hit"].numpy()
         hit = np.isfinite(reach)
         behind -= side * np.bincount(source[~hit], minlength=len(place))
@@ -132,17 +131,11 @@ def _rays(
 
 def _splats(place: Float32, normal: Float32, half_m: float) -> Any:
     """A ray casting scene with two triangles a patch, which overlap: rays must not slip."""
-    import open3d as o3d
-
     u, v = (np.float32(half_m) * axis for axis in across(normal))
     corner = np.stack([place - u - v, place + u - v, place + u + v, place - u + v], axis=1)
     first = 4 * np.arange(len(place), dtype=np.uint32)[:, None, None]
     face = first + np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(
-        o3d.core.Tensor(corner.reshape(-1, 3)), o3d.core.Tensor(face.reshape(-1, 3))
-    )
-    return scene
+    return ray_scene(corner.reshape(-1, 3), face.reshape(-1, 3))
 
 
 def _smoothness(place: Float32, normal: Float32) -> _Edges:

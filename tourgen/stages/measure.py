@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tourgen.geometry import Float64, Mesh, PointCloud
+from tourgen.rays import ray_scene
 from tourgen.stages import inferred
 from tourgen.stages.mesh_arrays import face_areas
 
@@ -42,10 +43,7 @@ def measure(
         stations: (s, 3) metres from the cloud's origin, that its ``station`` counts through.
         settings: What counts as inferred, as in the tiles.
     """
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(mesh.vertices, mesh.faces.astype(np.uint32))
+    scene = ray_scene(mesh.vertices, mesh.faces)
     step = max(1, len(cloud) // _SAMPLE)
     distance = scene.compute_distance(np.ascontiguousarray(cloud.points[::step])).numpy()
     p50, p95 = 1000 * np.quantile(distance, [0.5, 0.95])

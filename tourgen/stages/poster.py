@@ -8,17 +8,17 @@ from both sides, as in the viewer.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from tourgen.errors import StageError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tourgen.geometry import Float32, TexturedMesh, UInt8, View
+    from tourgen.rays import rays_of
+from tourgen.geometry import Float32, TexturedMesh, UInt8, View
 
 VERSION = 4
 
@@ -94,7 +94,6 @@ class _Scene:
     def __init__(self, tiles: Sequence[TexturedMesh]) -> None:
         import open3d as o3d
 
-        self._tensor = o3d.core.Tensor
         self._scene = o3d.t.geometry.RaycastingScene()
         self._tiles: dict[int, TexturedMesh] = {}
         for tile in tiles:
@@ -108,8 +107,8 @@ class _Scene:
     def look(self, eye: Float32, directions: Float32, void: tuple[int, int, int]) -> Float32:
         """(n, 3) what each ray sees; ``void`` where it meets nothing."""
         colors = np.tile(np.array(void, np.float32), (len(directions), 1))
-        rays = np.concatenate([np.broadcast_to(eye, directions.shape), directions], axis=1)
-        hit = self._cast(rays)
+        answer = self._scene.cast_rays(rays_of(eye, directions))
+        hit = {name: value.numpy() for name, value in answer.items()}
         geometry = hit["geometry_ids"]
         met = np.isfinite(hit["t_hit"])
         for key in np.unique(geometry[met]):
@@ -120,10 +119,6 @@ class _Scene:
             uv = corner[:, 0] * (1 - u - v) + corner[:, 1] * u + corner[:, 2] * v
             colors[which] = _bilinear(tile.texture, uv)
         return colors
-
-    def _cast(self, rays: Float32) -> dict[str, npt.NDArray[Any]]:
-        answer = self._scene.cast_rays(self._tensor(np.ascontiguousarray(rays, np.float32)))
-        return {name: value.numpy() for name, value in answer.items()}
 
 
 def _bilinear(texture: UInt8, uv: Float32) -> Float32:

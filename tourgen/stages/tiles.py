@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.geometry import Mesh, Tile
+from tourgen.rays import ray_scene
 from tourgen.stages.levels import Levels
 from tourgen.stages.mesh_arrays import compact, components, face_adjacency, on_grid, weld
 
@@ -145,8 +146,5 @@ def _simplify_locked(mesh: Mesh, ratio: float) -> Mesh:
 
 def _deviation_m(fine: Mesh, coarse: Mesh) -> float:
     """How far the fine mesh's vertices lie from the coarse one, 95th percentile."""
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(coarse.vertices, coarse.faces.astype(np.uint32))
+    scene = ray_scene(coarse.vertices, coarse.faces)
     return float(np.quantile(scene.compute_distance(fine.vertices).numpy(), 0.95))

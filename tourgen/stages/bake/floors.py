@@ -11,6 +11,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud, PointCloud
+from tourgen.rays import ray_scene, rays_of
 from tourgen.stages.bake.exemplars import continued
 from tourgen.stages.bake.points import Settings, color_index, of_points
 from tourgen.stages.bake.texels import Texels, to_bytes
@@ -101,16 +102,10 @@ def _with_one(points: npt.NDArray[np.floating]) -> Float64:
 
 def _is_floor(places: Float32, surface: Mesh) -> Bool:
     """(n,) where the surface lies at a place of the plane."""
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(
-        o3d.core.Tensor(surface.vertices), o3d.core.Tensor(surface.faces.astype(np.uint32))
-    )
     down = np.array([0, 0, -1], np.float32)
     above = places + _NEAR_M * np.array([0, 0, 1], np.float32)
-    rays = np.column_stack([above, np.broadcast_to(down, above.shape)])
-    hit = scene.cast_rays(o3d.core.Tensor(rays.astype(np.float32)))["t_hit"].numpy()
+    scene = ray_scene(surface.vertices, surface.faces)
+    hit = scene.cast_rays(rays_of(above, np.broadcast_to(down, above.shape)))["t_hit"].numpy()
     return np.asarray(hit < 2 * _NEAR_M)
 
 

@@ -20,12 +20,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from tourgen.geometry import Float32, Float64, Mesh, Panorama, UInt8
+from tourgen.rays import ray_scene, rays_of
 from tourgen.stages.bake.points import ColorIndex
 from tourgen.stages.bake.vista import Vista, directions, is_whole, smooth
 from tourgen.stages.burnt import burnt_out
@@ -82,22 +83,12 @@ def vistas(
     """
     if not panoramas:
         return ()
-    scene = _scene(mesh)
+    scene = ray_scene(mesh.vertices, mesh.faces)
     made = [_vista(each, scene, settings) for each in panoramas]
     return _balanced(made, index, settings)
 
 
-def _scene(mesh: Mesh) -> object:
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(
-        o3d.core.Tensor(mesh.vertices), o3d.core.Tensor(mesh.faces.astype(np.uint32))
-    )
-    return scene
-
-
-def _vista(panorama: Panorama, scene: object, settings: VistaSettings) -> Vista:
+def _vista(panorama: Panorama, scene: Any, settings: VistaSettings) -> Vista:
     height, width = panorama.image.shape[:2]
     scale = max(1.0, width / _WIDEST_DEPTH)
     size = (max(1, round(width / scale)), max(1, round(height / scale)))
@@ -111,11 +102,8 @@ def _vista(panorama: Panorama, scene: object, settings: VistaSettings) -> Vista:
     return Vista(panorama, pyramid, np.ones(3), range_m, trust)
 
 
-def _ranges(scene: object, position: Float64, way: Float32) -> Float32:
-    import open3d as o3d
-
-    rays = np.concatenate([np.broadcast_to(position.astype(np.float32), way.shape), way], axis=-1)
-    hit = scene.cast_rays(o3d.core.Tensor(rays))  # type: ignore[attr-defined]
+def _ranges(scene: Any, position: Float64, way: Float32) -> Float32:
+    hit = scene.cast_rays(rays_of(position, way))
     return np.asarray(hit["t_hit"].numpy(), np.float32)
 
 

@@ -26,6 +26,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Mesh, OrientedCloud, PointCloud
+from tourgen.rays import ray_scene
 from tourgen.stages.mesh_arrays import face_areas, vertex_normals
 from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.tangent_planes import TangentPlanes
@@ -124,12 +125,9 @@ class _Closed:
     """A closed surface whose distance has the sign of the side; see `signed_distance.Beyond`."""
 
     def __init__(self, mesh: Mesh, gap: Mask) -> None:
-        import open3d as o3d
-
         self.seeds: Float32 = mesh.vertices[np.unique(mesh.faces[gap])]
         self._faces, self._normals = mesh.faces, vertex_normals(mesh).astype(np.float32)
-        self._scene = o3d.t.geometry.RaycastingScene()
-        self._scene.add_triangles(mesh.vertices, mesh.faces.astype(np.uint32))
+        self._scene = ray_scene(mesh.vertices, mesh.faces)
 
     def distance(self, places: Float32) -> Float32:
         """(n,) metres that each of (n, 3) places lies in front of the nearest face."""
