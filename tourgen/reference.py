@@ -31,8 +31,8 @@ from tourgen.tour import (
     TourHead,
     Viewpoint,
 )
-from tourgen.tour_faults import keys, limits, marks, tables
-from tourgen.tour_values import Form, OnlyWith, as_room_id
+from tourgen.tour.faults import keys, limits, marks, tables
+from tourgen.tour.values import Form, OnlyWith, as_room_id
 
 _TABLES: Final[tuple[tuple[str, type[BaseModel], str], ...]] = (
     ("[tour]", TourHead, ""),

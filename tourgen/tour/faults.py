@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from tourgen.errors import InputError
-from tourgen.tour_values import listed, near, shown
+from tourgen.tour.values import listed, near, shown
 
 _CONTROL: Final = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 

@@ -1,8 +1,7 @@
 """All that tour.toml may say: every key once, with its type, its range and its meaning.
 
-`load_tour` reads a tour file and tells every fault of it at once, in the order of the file. The
-checks that need more than one key (a link's target, a text's language, a file that must exist)
-are validators of the key itself, fed by a context, so that one fault never hides another.
+The checks that need more than one key (a link's target, a text's language, a file that must
+exist) are validators of the key itself, fed by a context, so that one fault never hides another.
 
 Coordinates are in the frame of the scan after `unit` and `up` were applied: metres, right-handed,
 z up. Paths are relative to the folder of the tour file.
@@ -10,10 +9,7 @@ z up. Paths are relative to the folder of the tour file.
 
 from __future__ import annotations
 
-import re
-import tomllib
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -22,17 +18,13 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
-    ValidationError,
     ValidationInfo,
     field_validator,
     model_validator,
 )
 
-from tourgen.errors import Faults, InputError
-from tourgen.scans import Scan, open_scan
-from tourgen.tour_faults import faults_of
-from tourgen.tour_values import (
-    Context,
+from tourgen.errors import InputError
+from tourgen.tour.values import (
     File,
     Form,
     Languages,
@@ -54,11 +46,6 @@ from tourgen.tour_values import (
 
 TOUR_FILE: Final = "tour.toml"
 UNITS: Final[Mapping[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
-
-_READING_KEYS: Final = {"id", "scans", "unit", "up", "clean"}
-
-
-# ------------------------------------------------------------------ tables
 
 
 class _Table(BaseModel):
@@ -363,7 +350,7 @@ class TourHead(_Table):
     )
 
 
-class _File(_Table):
+class TourFile(_Table):
     """A tour file."""
 
     tour: TourHead = Field(description="The tour as a whole.")
@@ -398,197 +385,3 @@ class Tour(_Table):
                 return room
         ids = tuple(room.id for room in self.rooms)
         raise InputError(f"{TOUR_FILE}: room `{room_id}` does not exist", near(room_id, ids))
-
-
-# ------------------------------------------------------------------ reading
-
-
-def load_tour(folder: Path) -> Tour:
-    """Read and check `folder`/tour.toml; of the scans, that they exist and are not empty.
-
-    Every text comes back in every declared language: one that was not translated is given in the
-    first language that has it. A room without a title is named by its id, a link without one by
-    the room behind it.
-
-    Raises:
-        Faults: All that is wrong, in the order of the file.
-    """
-    data = _parse(folder / TOUR_FILE)
-    try:
-        file = _File.model_validate(data, context=_context(folder, data))
-    except ValidationError as error:
-        raise Faults(_faults(error, data)) from None
-    return _tour(folder, file)
-
-
-def check_tour(folder: Path) -> tuple[Tour, tuple[str, ...]]:
-    """Read `folder`/tour.toml and the headers of all scans that it names rightly.
-
-    Returns:
-        The tour, and what the publisher should know although a build will succeed.
-
-    Raises:
-        Faults: All that is wrong: with tour.toml, in the order of the file, then with the scans.
-    """
-    data = _parse(folder / TOUR_FILE)
-    try:
-        file = _File.model_validate(data, context=_context(folder, data))
-    except ValidationError as error:
-        faults = _faults(error, data)
-        scan_faults, _ = _check_headers(_readable_rooms(folder, data), folder)
-        raise Faults((*faults, *scan_faults)) from None
-    tour = _tour(folder, file)
-    return tour, check_scans(tour)
-
-
-def _faults(error: ValidationError, data: Mapping[str, Any]) -> tuple[InputError, ...]:
-    return tuple(
-        InputError(f"{TOUR_FILE}: {each.message}", each.hint)
-        for each in faults_of(error, data, _File)
-    )
-
-
-def _readable_rooms(folder: Path, data: Mapping[str, Any]) -> Iterator[Room]:
-    """Of a tour file at fault, the rooms whose scans can be checked all the same."""
-    tables = data.get("room")
-    for table in tables if isinstance(tables, list) else ():
-        if isinstance(table, dict):
-            wanted = {key: table[key] for key in table.keys() & _READING_KEYS}
-            with suppress(ValidationError):
-                yield Room.model_validate(wanted, context=_context(folder, data))
-
-
-def _tour(folder: Path, file: _File) -> Tour:
-    """The tour, its texts filled in."""
-    languages = file.tour.languages
-    titles = {room.id: room.title or dict.fromkeys(languages, room.id) for room in file.room}
-    rooms = tuple(
-        room.model_copy(
-            update={
-                "title": titles[room.id],
-                "links": tuple(
-                    link.model_copy(update={"title": link.title or titles[link.to]})
-                    for link in room.links
-                ),
-            }
-        )
-        for room in file.room
-    )
-    return Tour(
-        folder=folder.resolve(),
-        title=file.tour.title,
-        languages=languages,
-        start=file.tour.start or rooms[0].id,
-        rooms=rooms,
-    )
-
-
-def _parse(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except FileNotFoundError:
-        told = InputError(
-            f"{TOUR_FILE}: expected a file in `{path.parent}`, found none",
-            f"write one with `tourgen new {path.parent}`",
-        )
-    except OSError as error:
-        told = InputError(f"{TOUR_FILE}: expected a file that can be read, found: {error.strerror}")
-    except UnicodeDecodeError as error:
-        told = InputError(
-            f"{TOUR_FILE}: expected UTF-8, found byte {error.object[error.start]:#x} at "
-            f"position {error.start}",
-            "save the file as UTF-8",
-        )
-    except tomllib.TOMLDecodeError as error:
-        place = re.search(r"^(.*) \(at (?:line (\d+), column (\d+)|end of document)\)$", str(error))
-        reason = place[1] if place else str(error)
-        where = f"line {place[2]}, column {place[3]}" if place and place[2] else "end of the file"
-        told = InputError(
-            f"{TOUR_FILE}: {where}: expected TOML, found: {reason[:1].lower()}{reason[1:]}"
-        )
-    raise Faults((told,)) from None
-
-
-def _context(folder: Path, data: Mapping[str, Any]) -> Context:
-    head, rooms = data.get("tour"), data.get("room")
-    languages = head.get("languages", ["en"]) if isinstance(head, dict) else []
-    valid = isinstance(languages, list) and all(isinstance(name, str) for name in languages)
-    ids = (
-        [room.get("id") for room in rooms or [] if isinstance(room, dict)]
-        if isinstance(rooms, list)
-        else []
-    )
-    return Context(
-        folder,
-        tuple(languages) if valid else (),
-        tuple(name for name in ids if isinstance(name, str)),
-    )
-
-
-# ------------------------------------------------------------------ scans
-
-
-def open_scans(room: Room, folder: Path) -> tuple[Scan, ...]:
-    """Read the headers of a room's scans.
-
-    Args:
-        room: The room.
-        folder: Where its paths start.
-
-    Raises:
-        InputError: A scan cannot be read; the first one that cannot.
-    """
-    return tuple(_open(room, scan, folder) for scan in room.scans)
-
-
-def check_scans(tour: Tour) -> tuple[str, ...]:
-    """Read the headers of all scans.
-
-    Returns:
-        What the publisher should know although a build will succeed, one line each.
-
-    Raises:
-        Faults: Every scan that cannot be read, every room of too few points.
-    """
-    faults, warnings = _check_headers(tour.rooms, tour.folder)
-    if faults:
-        raise Faults(faults)
-    return warnings
-
-
-def _check_headers(
-    rooms: Iterable[Room], folder: Path
-) -> tuple[tuple[InputError, ...], tuple[str, ...]]:
-    """Faults and warnings of the scans of these rooms."""
-    faults: list[InputError] = []
-    warnings: list[str] = []
-    for room in rooms:
-        scans: list[Scan] = []
-        for reference in room.scans:
-            try:
-                scans.append(_open(room, reference, folder))
-            except InputError as error:
-                faults.append(InputError(f"room `{room.id}`: {error.message}", error.hint))
-        warnings += (f"room `{room.id}`: {each}" for scan in scans for each in scan.warnings)
-        found = sum(scan.point_count for scan in scans)
-        if len(scans) == len(room.scans) and found < room.clean.min_points:
-            names = " + ".join(f"`{scan.name}`" for scan in scans)
-            faults.append(
-                InputError(
-                    f"room `{room.id}`: scan {names}: expected at least {room.clean.min_points} "
-                    f"points, found {found}",
-                    "check the export, or lower `clean.min_points`",
-                )
-            )
-    return tuple(faults), tuple(warnings)
-
-
-def _open(room: Room, scan: ScanRef, folder: Path) -> Scan:
-    return open_scan(
-        folder / scan.file,
-        room.unit_m,
-        room.up,
-        name=scan.file,
-        pose=scan.pose,
-        station=scan.station,
-    )

@@ -1,7 +1,7 @@
 """The kinds of values that tour.toml may hold, and how each is checked.
 
 A value at fault raises a `PydanticCustomError` of type "tour" with message and hint, which
-`tour_faults` puts into words together with the key.
+`tour.faults` puts into words together with the key.
 """
 
 from __future__ import annotations
