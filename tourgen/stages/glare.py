@@ -17,12 +17,14 @@ from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, PointCloud, UInt8
 from tourgen.stages.burnt import burnt_out
-from tourgen.stages.station_cells import cells_of
+from tourgen.stages.station_cells import Cells, cells_of
 
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
 
 _DIRECTION_DEG = 1.0
+_WIDEST = 60
+"""Cells of directions lie no farther from the middle along any axis."""
 _TOUCHING_CELLS = 2.5
 _SURROUNDING_POINTS = 16
 
@@ -97,34 +99,65 @@ class _About:
 
 
 def _about_burnt(cloud: PointCloud, burnt: Bool, stations: Float64, settings: Settings) -> _About:
+    """About which spots the points of all stations lie."""
     about = _About(np.full(len(cloud), -1), np.zeros(len(cloud), np.int64))
-    reach = 2 * np.sin(np.radians(settings.reach_deg) / 2) / np.radians(_DIRECTION_DEG)
     spots = 0
     for number, station in enumerate(stations):
         own = np.flatnonzero(cloud.station == number)
-        if not burnt[own].any():
-            continue
-        way = cloud.points[own] - station.astype(np.float32)
-        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
-        steps = np.rint(way / np.radians(_DIRECTION_DEG)).astype(np.int64) + 128
-        key, place = np.unique(
-            (steps[:, 0] * 256 + steps[:, 1]) * 256 + steps[:, 2], return_inverse=True
-        )
-        cells = np.stack([key >> 16, key >> 8 & 255, key & 255], axis=1).astype(np.float32)
-        seeds = cKDTree(cells[np.unique(place[burnt[own]])])
-        _, nearest = seeds.query(cells, distance_upper_bound=reach)
-        touching = seeds.sparse_distance_matrix(seeds, _TOUCHING_CELLS)
-        found, spot = connected_components(touching, directed=False)
-        spot_of = np.append(spot, -1)[nearest][place]
-        middles = np.stack(
-            [np.bincount(spot, axis, found) / np.bincount(spot) for axis in seeds.data.T - 128], 1
-        )
-        middles /= np.linalg.norm(middles, axis=1, keepdims=True)
-        cosine = (way * middles[spot_of].astype(np.float32)).sum(1)
-        about.off_deg[own] = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-        about.spot[own] = np.where(spot_of < 0, -1, spot_of + spots)
-        spots += found
+        if burnt[own].any():
+            way = cloud.points[own] - station.astype(np.float32)
+            way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
+            found = _about_spots(way, burnt[own], settings)
+            about.spot[own] = np.where(found.spot < 0, -1, found.spot + spots)
+            about.off_deg[own] = found.off_deg
+            spots += int(found.spot.max()) + 1
     return about
+
+
+def _about_spots(way: Float32, burnt: Bool, settings: Settings) -> _About:
+    """About which spots of one picture its directions lie; spots are found in cells of a degree."""
+    step = np.rint(way / np.radians(_DIRECTION_DEG)).astype(np.int64)
+    span = (2 * _WIDEST + 1,) * 3
+    key, of_cell = np.unique(np.ravel_multi_index((step + _WIDEST).T, span), return_inverse=True)
+    cells = np.stack(np.unravel_index(key, span), axis=1) - _WIDEST
+    seeds = cKDTree(cells[np.unique(of_cell[burnt])])
+    reach = 2 * np.sin(np.radians(settings.reach_deg) / 2) / np.radians(_DIRECTION_DEG)
+    _, nearest = seeds.query(cells, distance_upper_bound=reach)
+    touching = seeds.sparse_distance_matrix(seeds, _TOUCHING_CELLS)
+    count, spot = connected_components(touching, directed=False)
+    summed = np.stack([np.bincount(spot, axis, count) for axis in seeds.data.T], axis=1)
+    middles = summed / np.linalg.norm(summed, axis=1, keepdims=True)
+    spot_of = np.append(spot, -1)[nearest][of_cell].astype(np.int64)
+    cosine = (way * middles[spot_of].astype(np.float32)).sum(axis=1)
+    return _About(spot_of, np.degrees(np.arccos(np.clip(cosine, -1, 1))).astype(np.int64))
+
+
+@dataclass(frozen=True, slots=True)
+class _Shades:
+    """How bright each station saw each cell, and what the others saw there.
+
+    Attributes:
+        shade: (c,) mean brightness of one station in one cell.
+        least: (c,) of all stations with enough points in that cell, the darkest.
+        enough: (c,) whether the station has enough points there.
+        told: (c,) whether another station has.
+    """
+
+    shade: Float64
+    least: Float64
+    enough: Bool
+    told: Bool
+
+    @staticmethod
+    def of(cells: Cells, colors: UInt8, settings: Settings) -> _Shades:
+        shade = cells.means(colors).mean(1)
+        enough = cells.sizes >= settings.cell_points
+        firsts = np.flatnonzero(np.diff(cells.cell, prepend=-1))
+        stations = np.diff(firsts, append=len(cells.cell))
+        least = np.minimum.reduceat(np.where(enough, shade, np.inf), firsts)
+        telling = np.add.reduceat(enough.astype(np.int64), firsts)
+        told = np.repeat(telling, stations) - enough > 0
+        return _Shades(shade, np.repeat(least, stations), enough, told)
 
 
 def _glared(cloud: PointCloud, burnt: _About, lamps: Bool, settings: Settings) -> tuple[Bool, Bool]:
@@ -138,29 +171,37 @@ def _glared(cloud: PointCloud, burnt: _About, lamps: Bool, settings: Settings) -
     about = (cloud.station >= 0) & ((cloud.points >= low) & (cloud.points <= high)).all(1)
     count = int(cloud.station.max()) + 1
     cells = cells_of(cloud.points[about], cloud.station[about], count, settings.cell_m)
-    shade = cells.means(cloud.colors[about]).mean(1)
-    enough = cells.sizes >= settings.cell_points
-    firsts = np.flatnonzero(np.diff(cells.cell, prepend=-1))
-    groups = np.diff(firsts, append=len(cells.cell))
-    least = np.repeat(np.minimum.reduceat(np.where(enough, shade, np.inf), firsts), groups)
-    told = np.repeat(np.add.reduceat(enough.astype(np.int64), firsts), groups) - enough > 0
+    seen = _Shades.of(cells, cloud.colors[about], settings)
     suspect = cells.means(near[about][:, None])[:, 0] > 0.5
-    glared[about] = cells.of_points(suspect & (shade > least + settings.brighter))
+    glared[about] = cells.of_points(suspect & (seen.shade > seen.least + settings.brighter))
     first = cells.order[cells.starts]
-    spot, ring = burnt.spot[about][first], burnt.off_deg[about][first]
-    dark = ~lamps[about][first] & (spot >= 0)
-    compared = np.flatnonzero(suspect & dark & told & enough)
-    excess = np.zeros((int(spot.max(initial=0)) + 1, int(ring.max(initial=0)) + 1))
-    key = spot[compared] * excess.shape[1] + ring[compared]
-    for each, cells_there in zip(*np.unique(key, return_counts=True), strict=True):
-        if cells_there >= settings.ring_cells:
-            of = compared[key == each]
-            excess.flat[each] = np.median(shade[of] - least[of])
-    # Glare only fades: what is nearer the lamp's middle is dazzled at least as much.
-    excess = np.maximum.accumulate(excess[:, ::-1], axis=1)[:, ::-1]
-    alone = suspect & dark & ~told & (excess[spot, ring] > settings.dazzled)
+    where = _About(burnt.spot[about][first], burnt.off_deg[about][first])
+    dark = suspect & ~lamps[about][first] & (where.spot >= 0)
+    excess = _excess(seen, where, dark & seen.told & seen.enough, settings)
+    alone = dark & ~seen.told & (excess[where.spot, where.off_deg] > settings.dazzled)
     dazzled[about] = cells.of_points(alone)
     return glared, dazzled
+
+
+def _excess(seen: _Shades, where: _About, compared: Bool, settings: Settings) -> Float64:
+    """(spots, degrees) how much brighter than other stations a spot makes what lies so far off.
+
+    Args:
+        seen: c cells of one station each.
+        where: (c,) about which spot.
+        compared: (c,) those that tell.
+        settings: See there.
+    """
+    rings = int(where.off_deg.max(initial=0)) + 1
+    excess = np.zeros((int(where.spot.max(initial=0)) + 1, rings))
+    ring = where.spot * rings + where.off_deg
+    at = np.flatnonzero(compared)
+    for each, count in zip(*np.unique(ring[at], return_counts=True), strict=True):
+        if count >= settings.ring_cells:
+            of = at[ring[at] == each]
+            excess.flat[each] = np.median(seen.shade[of] - seen.least[of])
+    # Glare only fades: what is nearer the lamp's middle is dazzled at least as much.
+    return np.asarray(np.maximum.accumulate(excess[:, ::-1], axis=1)[:, ::-1])
 
 
 def _near_lamps(
