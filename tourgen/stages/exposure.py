@@ -26,7 +26,7 @@ from scipy.sparse.csgraph import connected_components
 from tourgen.geometry import Float32, Float64, PointCloud, UInt8
 from tourgen.stages import glare
 from tourgen.stages.burnt import ends
-from tourgen.stages.station_cells import cells_of
+from tourgen.stages.cells import cells_of
 
 VERSION = 3
 

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, PointCloud, UInt8
 from tourgen.stages.burnt import burnt_out
-from tourgen.stages.station_cells import Cells, cells_of
+from tourgen.stages.cells import Cells, cells_of
 
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]

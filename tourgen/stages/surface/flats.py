@@ -313,13 +313,29 @@ def _moved(planes: TangentPlanes, surfels: _Surfels, flats: Flats) -> tuple[Tang
         distance_upper_bound=1.5 * surfels.edge_m,
         workers=-1,
     )
-    label = np.append(flats.of[lain], -1)[near]
-    best = np.full(len(planes.points), np.inf, np.float32)
-    chosen = np.full(len(planes.points), -1)
-    height_at = np.zeros(len(planes.points), np.float32)
+    chosen, height = _nearest(planes, flats, np.append(flats.of[lain], -1)[near])
+    on = np.flatnonzero(chosen >= 0)
+    points, normals, support = planes.points.copy(), planes.normals.copy(), planes.support.copy()
+    normals[on] = flats.normals[chosen[on]]
+    points[on] -= height[on, None] * normals[on]
+    support[on] = 1
+    moved = TangentPlanes(points, normals, planes.spacing_m, support, planes.noise_m)
+    return moved, replace(flats, of=chosen)
+
+
+def _nearest(planes: TangentPlanes, flats: Flats, label: Ints) -> tuple[Ints, Float32]:
+    """Which of a few flats each tangent plane lies on, -1 for none, and how high over it.
+
+    Args:
+        planes: n tangent planes.
+        flats: See there.
+        label: (n, k) numbers of the flats near each, -1 for none.
+    """
+    best = np.full(len(label), np.inf, np.float32)
+    chosen = np.full(len(label), -1)
+    height_at = np.zeros(len(label), np.float32)
     limit = np.float32(_POINT_OFF * planes.noise_m)
-    for rank in range(_AROUND):
-        plane = label[:, rank]
+    for plane in label.T:
         asked = np.flatnonzero(plane >= 0)
         normal = flats.normals[plane[asked]].astype(np.float32)
         height = np.einsum("ij,ij->i", planes.points[asked], normal)
@@ -329,10 +345,4 @@ def _moved(planes: TangentPlanes, surfels: _Surfels, flats: Flats) -> tuple[Tang
         better = (np.abs(height) < limit) & (turned > _TURNED) & (cost < best[asked])
         at = asked[better]
         best[at], chosen[at], height_at[at] = cost[better], plane[at], height[better]
-    on = np.flatnonzero(chosen >= 0)
-    points, normals, support = planes.points.copy(), planes.normals.copy(), planes.support.copy()
-    normals[on] = flats.normals[chosen[on]]
-    points[on] -= height_at[on, None] * normals[on]
-    support[on] = 1
-    moved = TangentPlanes(points, normals, planes.spacing_m, support, planes.noise_m)
-    return moved, replace(flats, of=chosen)
+    return chosen, height_at

@@ -21,6 +21,7 @@ from scipy.ndimage import binary_closing
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64
+from tourgen.stages.cells import cells_of
 from tourgen.stages.surface.flats import Flats
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 
@@ -41,6 +42,8 @@ _CELL = 2.0
 _NEIGHBOURS = 32
 _FIRST = 0.25
 """Where the first sample lies from the line, in spacings."""
+_ROWS = np.arange(_FIRST, _REACH)
+"""Where all of them lie."""
 
 Ints = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
@@ -83,16 +86,11 @@ def met(planes: TangentPlanes, flats: Flats, spacing_m: float) -> TangentPlanes:
 
 def _pairs(points: Float32, flats: Flats, spacing_m: float) -> Iterator[tuple[int, int, Ints]]:
     """Flats that come near each other at an angle, and all points near where they do."""
-    if not len(flats.normals):
-        return
     none = len(flats.normals)
-    of = np.where(flats.of < 0, none, flats.of)
-    cell = np.floor((points - points.min(axis=0)) / (_CELL * spacing_m)).astype(np.int64)
-    key = np.ravel_multi_index((*cell.T, of), (*(cell.max(axis=0) + 1), none + 1))
-    order = np.argsort(key, kind="stable")
-    starts = np.flatnonzero(np.diff(key[order], prepend=-1))
-    stops = np.append(starts[1:], len(points))
-    middle = np.add.reduceat(points[order], starts) / (stops - starts)[:, None]
+    if not none:
+        return
+    cells = cells_of(points, np.where(flats.of < 0, none, flats.of), none + 1, _CELL * spacing_m)
+    middle = cells.means(points)
     distance, found = cKDTree(middle).query(
         middle,
         k=np.arange(1, _NEIGHBOURS + 1),
@@ -100,29 +98,31 @@ def _pairs(points: Float32, flats: Flats, spacing_m: float) -> Iterator[tuple[in
         workers=-1,
     )
     near = np.asarray(found)
-    number = of[order[starts]]
-    there = np.isfinite(distance).ravel()
-    one, other = np.repeat(np.arange(len(middle)), _NEIGHBOURS)[there], near.ravel()[there]
-    low, high = np.minimum(number[one], number[other]), np.maximum(number[one], number[other])
-    real = np.flatnonzero((high < none) & (low < high))
-    low, high, one = low[real], high[real], one[real]
-    cosine = np.abs(np.einsum("ij,ij->i", flats.normals[low], flats.normals[high]))
-    good = (cosine < _BLUNT) & ~(flats.narrow[low] & flats.narrow[high])
-    pair, one = (low * none + high)[good], one[good]
-    by_pair = np.argsort(pair, kind="stable")
-    for chosen in np.split(by_pair, np.flatnonzero(np.diff(pair[by_pair])) + 1):
+    one, rank = np.nonzero(np.isfinite(distance))
+    pair = _creased(cells.owner[one], cells.owner[near[one, rank]], flats)
+    one, pair = one[pair >= 0], pair[pair >= 0]
+    order = np.argsort(pair, kind="stable")
+    for chosen in np.split(order, np.flatnonzero(np.diff(pair[order])) + 1):
         if len(chosen):
             around = near[np.unique(one[chosen])]
-            cells = np.unique(around[around < len(middle)])
+            groups = np.unique(around[around < len(middle)])
             first, second = divmod(int(pair[chosen[0]]), none)
-            yield first, second, order[_ranges(starts[cells], stops[cells])]
+            yield first, second, cells.members(groups)
 
 
-def _ranges(starts: Ints, stops: Ints) -> Ints:
-    """All numbers of several ranges."""
-    count = stops - starts
-    before = np.cumsum(count) - count
-    return np.asarray(np.arange(count.sum()) + np.repeat(starts - before, count))
+def _creased(one: Ints, other: Ints, flats: Flats) -> Ints:
+    """(n,) number of each pair of flats, the lower times their count plus the higher.
+
+    -1 where they are no two flats, or leave no crease.
+    """
+    none = len(flats.normals)
+    low, high = np.minimum(one, other), np.maximum(one, other)
+    pair = np.where((high < none) & (low < high), low * none + high, -1)
+    real = np.flatnonzero(pair >= 0)
+    low, high = low[real], high[real]
+    cosine = np.abs(np.einsum("ij,ij->i", flats.normals[low], flats.normals[high]))
+    pair[real[(cosine >= _BLUNT) | (flats.narrow[low] & flats.narrow[high])]] = -1
+    return np.asarray(pair)
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +154,41 @@ class _Line:
 
 
 @dataclass(frozen=True, slots=True)
+class _Side:
+    """Points about a line, as one of the flats that may meet there has it.
+
+    Attributes:
+        across: (n,) how far each lies from the line within the flat, spacings.
+        mine: (n,) which are the flat's.
+        front: (m,) at each place along the line, whether the flat ends before, 1, or behind the
+            other flat, -1; 0: it does not end there.
+        near: (m,) how near to the line, spacings.
+    """
+
+    across: Float64
+    mine: Mask
+    front: Float64
+    near: Float64
+
+    @staticmethod
+    def of(across: Float64, mine: Mask, place: Ints, facing: float) -> _Side:
+        about = mine & (np.abs(across) < _REACH)
+        end, near = _ended(place[about], across[about], int(place.max()) + 1)
+        return _Side(across, mine, end * facing, near)
+
+    def rows(self, at: Ints, both: Mask) -> tuple[Ints, Ints]:
+        """Which places want samples, and in which rows from the line, so that the flat reaches it.
+
+        Args:
+            at: (k,) places where the flats meet or are bridged.
+            both: (m,) where they meet.
+        """
+        end = np.interp(at, np.flatnonzero(both), self.near[both])
+        wanted, row = np.nonzero(end[:, None] - _FIRST > _ROWS)
+        return wanted, row
+
+
+@dataclass(frozen=True, slots=True)
 class _Meeting:
     """Of two flats.
 
@@ -174,30 +209,26 @@ def _meeting(
     along = apart @ line.along
     low = int(np.floor(along.min()))
     place = np.floor(along).astype(np.int64) - low
-    length = int(place.max()) + 1
-    aside = [apart @ way for way in line.aside]
-    mine = [(of == number) & (np.abs(a) < _REACH) for number, a in zip(pair, aside, strict=True)]
-    ended = [_ended(place[own], a[own], length) for own, a in zip(mine, aside, strict=True)]
-    front = [side * facing for (side, _), facing in zip(ended, line.facing, strict=True)]
+    one, other = (
+        _Side.of(apart @ way, of == number, place, facing)
+        for way, number, facing in zip(line.aside, pair, line.facing, strict=True)
+    )
     off = np.sqrt(np.maximum(np.square(apart).sum(axis=1) - along**2, 0))
-    third = ~np.isin(of, pair)
-    gap = np.maximum(ended[0][1], ended[1][1])
-    others = third & (off > _MIXED) & (off < gap[place] + _MIXED)
-    free = np.bincount(place[others], minlength=length) == 0
-    turn, both, bridged = _turned(front[0], front[1], free)
+    third = ~(one.mine | other.mine)
+    gap = np.maximum(one.near, other.near)
+    between = third & (off > _MIXED) & (off < gap[place] + _MIXED)
+    free = np.bincount(place[between], minlength=len(gap)) == 0
+    turn, both, bridged = _turned(one.front, other.front, free)
     if both.sum() < _LEAST:
         return None
     at = np.flatnonzero(bridged)
     where = (at + low + 0.5)[:, None] * line.along
-    rows = np.arange(_FIRST, _REACH)
     gone = third & (off < _MIXED)
     samples = []
-    for k, number in enumerate(pair):
-        side = turn * line.facing[k]
-        end = np.interp(at, np.flatnonzero(both), ended[k][1][both])
-        wanted, row = np.nonzero(rows < end[:, None] - _FIRST)
-        samples.append((where[wanted] + (side * rows[row])[:, None] * line.aside[k]) * spacing_m)
-        gone |= (of == number) & (aside[k] * side < 0)
+    for side, way, facing in zip((one, other), line.aside, turn * line.facing, strict=True):
+        wanted, row = side.rows(at, both)
+        samples.append((where[wanted] + (facing * _ROWS[row])[:, None] * way) * spacing_m)
+        gone |= side.mine & (side.across * facing < 0)
     return _Meeting((samples[0], samples[1]), np.flatnonzero(gone & bridged[place]))
 
 
@@ -205,9 +236,8 @@ def _turned(first: Float64, second: Float64, free: Mask) -> tuple[int, Mask, Mas
     """Whether two flats meet in a corner, 1, or at an edge, -1; where; and with what is bridged.
 
     Args:
-        first: (m,) whether one flat ends before, 1, or behind the other, -1, at each place; 0: it
-            does not end there.
-        second: (m,) the same of the other flat.
+        first: (m,) the front of one.
+        second: (m,) that of the other.
         free: (m,) whether nothing stands between them.
     """
     both = (first != 0) & (first == second) & free

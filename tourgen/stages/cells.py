@@ -1,4 +1,8 @@
-"""Small cells of a room, station by station, so that what stations saw there can be compared."""
+"""Small cells of a room, with the points of each sorted by their owners.
+
+An owner is the station that saw a point, or the plane that it lies on: what several of them have
+in one cell can be compared.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +19,14 @@ Int64 = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """Points sorted into groups of one cell and one station, the groups of a cell in a row.
+    """Points sorted into groups of one cell and one owner, the groups of a cell in a row.
 
     Attributes:
         order: (n,) positions of the points, group after group.
         starts: (g,) where each group begins.
         sizes: (g,)
         cell: (g,) number of the group's cell.
-        owner: (g,) its station.
+        owner: (g,) its owner.
     """
 
     order: Int64
@@ -39,6 +43,13 @@ class Cells:
         ]
         return np.stack(columns, axis=1) / self.sizes[:, None]
 
+    def members(self, groups: Int64) -> Int64:
+        """Positions of the points of some groups, group after group."""
+        count = self.sizes[groups]
+        before = np.cumsum(count) - count
+        at = np.arange(count.sum()) + np.repeat(self.starts[groups] - before, count)
+        return np.asarray(self.order[at])
+
     def of_points(self, values: Bool) -> Bool:
         """(n,) each point's group's value."""
         spread = np.empty(len(self.order), bool)
@@ -46,7 +57,7 @@ class Cells:
         return spread
 
 
-def cells_of(points: Float32, owner: npt.NDArray[np.int16], count: int, cell_m: float) -> Cells:
+def cells_of(points: Float32, owner: npt.NDArray[np.integer], count: int, cell_m: float) -> Cells:
     """Sort n points of ``count`` owners into cells."""
     if not len(points):
         none = np.zeros(0, np.int64)
