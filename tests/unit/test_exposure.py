@@ -77,6 +77,27 @@ def test_what_one_camera_clipped_is_as_bright_as_the_others_saw_it() -> None:
         assert told == pytest.approx(seen, abs=1.5)
 
 
+def test_what_a_camera_clipped_is_told_by_what_others_saw_nearest_to_it() -> None:
+    """About a lamp the wall is brighter than beside it; one station clips both."""
+    places, station = wall(120_000)
+    off = np.hypot(places[:, 0] - 1.65, places[:, 1] - 1.0)
+    clean = np.full((len(places), 3), 120.0) + 40 * np.sin(7 * places[:, :1])
+    clean[places[:, 0] > 1.3] = 200
+    clean[off < 0.3] = 225
+    clean[(places < 0.1).all(1)] = 240  # the others' cameras reach farther up than that
+    gain = np.array([[1.0], [1.0], [1.3]])
+    cloud = cloud_of(places, clean * gain[station], station)
+    even = exposure(cloud.take((off > 0.1) | (station == 2)), STATIONS, Settings())
+    off = np.hypot(even.points[:, 0] - 1.65, even.points[:, 1] - 1.0)
+    bright = even.points[:, 0] > 1.35
+    for part in (off > 0.35, (off > 0.12) & (off < 0.25)):
+        seen, told = (
+            even.colors[bright & part & (even.station == k)].mean(dtype=float) for k in (0, 2)
+        )
+        assert told == pytest.approx(seen, abs=2)
+    assert even.colors[off < 0.08].mean() == pytest.approx(seen, abs=3)
+
+
 def test_a_remnant_of_unknown_station_joins_the_others() -> None:
     cloud = exposed_wall()
     station = cloud.station.copy()

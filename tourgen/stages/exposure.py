@@ -8,7 +8,7 @@ graph of pairs as in Brown and Lowe: Automatic panoramic image stitching, 2007, 
 gauge is free: the gains' geometric mean is 1.
 
 Where a channel is clipped a factor tells too little: what was clipped is as bright as other
-stations saw it in the middle.
+stations saw it there or, where none did, nearest to there.
 
 Tried and rejected: means instead of medians of the ratios: a passer-by and mixed pixels pull them
 by 1 %; a curve instead of a factor, which the range of one room's tones does not fix.
@@ -22,13 +22,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, PointCloud, UInt8
 from tourgen.stages import glare
 from tourgen.stages.burnt import ends
 from tourgen.stages.cells import cells_of
 
-VERSION = 3
+VERSION = 4
 
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
@@ -36,6 +37,7 @@ Int64 = npt.NDArray[np.int64]
 _HUBER = 2.0  # standard errors
 _ROUNDS = 20
 _LEAST_ERROR = 5e-4  # of a pair's log ratio, however many cells tell it
+_COMPARED = 8  # cells that tell what a camera clipped
 _CLIPPED_SHARE = (0.1, 0.9)  # of a cell's points: below, it is not, above, it is
 
 
@@ -93,7 +95,7 @@ def _raise_clipped(
     count: int,
     settings: Settings,
 ) -> None:
-    """Set clipped values to what other stations saw there, in the middle; in place.
+    """Set clipped values to what other stations saw there, or nearest to there; in place.
 
     Args:
         colors: (n, 3) of one exposure.
@@ -103,7 +105,7 @@ def _raise_clipped(
         settings: See there.
     """
     cells = cells_of(cloud.points, owner, count, settings.cell_m)
-    means = cells.means(colors)
+    means, middles = cells.means(colors), cells.means(cloud.points)
     firsts = np.flatnonzero(np.diff(cells.cell, prepend=-1))
     groups = np.diff(firsts, append=len(cells.cell))
     seldom, mostly = _CLIPPED_SHARE
@@ -118,8 +120,11 @@ def _raise_clipped(
         for station in np.unique(cells.owner[compared]):
             of = compared & (cells.owner == station)
             if of.sum() >= settings.pair_cells:
-                value = np.clip(np.rint(np.median(there[of])), 0, 255)
-                own = clipped[:, channel] & (owner == station)
+                own = np.flatnonzero(clipped[:, channel] & (owner == station))
+                _, near = cKDTree(middles[of]).query(
+                    cloud.points[own], k=range(1, _COMPARED + 1), workers=-1
+                )
+                value = np.clip(np.rint(np.median(there[of][near], axis=1)), 0, 255)
                 colors[own, channel] = np.maximum(colors[own, channel], value)
 
 

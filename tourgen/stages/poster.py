@@ -7,18 +7,14 @@ from both sides, as in the viewer.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tourgen.errors import StageError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from tourgen.rays import rays_of
 from tourgen.geometry import Float32, TexturedMesh, UInt8, View
+from tourgen.rays import rays_of
 
 VERSION = 4
 
