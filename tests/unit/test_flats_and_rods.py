@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import trimesh
 
 from tourgen.geometry import Mesh
 from tourgen.stages.surface.flats import flattened
-from tourgen.stages.surface.rods import Rod, rods, with_tubes
+from tourgen.stages.surface.rods import rods
 from tourgen.stages.surface.tangent_planes import TangentPlanes
+from tourgen.stages.surface.tubes import Rod, with_tubes
 
 SPACING_M = 0.012
 NOISE_M = 0.0013
@@ -82,20 +84,102 @@ def test_a_rail_seen_from_one_side_is_found_and_a_wall_is_none() -> None:
     assert len(found) == 1
     (rod,) = found
     assert abs(rod.radius_m - 0.01) < 0.002
-    assert abs(rod.along[2]) > 0.999
+    along = rod.axis[-1] - rod.axis[0]
+    assert abs(along[2]) > 0.999 * np.linalg.norm(along)
     assert abs(rod.length_m - 0.4) < 0.04
-    middle = rod.start + rod.length_m / 2 * rod.along
-    assert np.linalg.norm(middle - [2, 2, 0.5]) < 0.02
+    assert np.linalg.norm(rod.axis.mean(axis=0) - [2, 2, 0.5]) < 0.02
     assert theirs[-80:].mean() > 0.9
     assert not theirs[:-80].any()
+
+
+HANDRAIL_M = 0.02
+
+
+def handrail(turn: np.ndarray) -> np.ndarray:
+    """Places of a handrail that winds up a shaft of a metre."""
+    return np.stack([np.cos(turn), np.sin(turn), 0.4 * turn + 1], axis=1)
+
+
+def on_handrail(rng: np.random.Generator, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points of it, seen from within the shaft."""
+    inward = np.stack([-np.cos(turn), -np.sin(turn), np.zeros(len(turn))], axis=1)
+    along = np.stack([-np.sin(turn), np.cos(turn), np.full(len(turn), 0.4)], axis=1)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    angle = rng.uniform(-1.3, 1.3, len(turn))
+    outward = np.cos(angle)[:, None] * inward
+    outward += np.sin(angle)[:, None] * np.cross(along, inward)
+    off = HANDRAIL_M + rng.normal(0, NOISE_M, len(turn))
+    return handrail(turn) + off[:, None] * outward, outward
+
+
+def test_a_handrail_is_traced_up_a_winding_stair_through_its_sparse_stretches() -> None:
+    rng = np.random.default_rng(2)
+    turn = np.concatenate([rng.uniform(0, 6, 1500), rng.uniform(2, 4, 500)])
+    sparse = (turn > 4.5) & (turn < 5.2)
+    turn = turn[~sparse | (rng.random(len(turn)) < 0.3)]
+    points, normals = on_handrail(rng, turn)
+    told = planes_of(points, normals)
+    found, theirs = rods(told, told.points, np.ones(len(points), bool), SPACING_M)
+    assert theirs.mean() > 0.97
+    axis = np.concatenate([rod.axis for rod in found])
+    away = np.linalg.norm(axis[:, None] - handrail(np.arange(-0.1, 6.1, 0.001)), axis=2).min(1)
+    assert np.quantile(away, 0.9) < 0.003
+    assert sum(rod.length_m for rod in found) == pytest.approx(6 * np.hypot(1, 0.4), abs=0.1)
+    for rod in found:
+        assert rod.radius_m == pytest.approx(HANDRAIL_M, abs=0.003)
+
+
+def ring(rng: np.random.Generator, count: int = 600) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a ring of 24 mm, half a metre wide, seen from above."""
+    turn = rng.uniform(0, 2 * np.pi, count)
+    away = np.stack([np.cos(turn), np.sin(turn), np.zeros(count)], axis=1)
+    angle = rng.uniform(0, np.pi, count)
+    outward = np.cos(angle)[:, None] * away + np.sin(angle)[:, None] * [0.0, 0.0, 1.0]
+    return 0.25 * away + (0.012 + rng.normal(0, NOISE_M, count))[:, None] * outward, outward
+
+
+def test_a_ring_is_traced_once() -> None:
+    points, normals = ring(np.random.default_rng(4))
+    told = planes_of(points, normals)
+    found, theirs = rods(told, told.points, np.ones(len(points), bool), SPACING_M)
+    assert theirs.mean() > 0.95
+    assert sum(rod.length_m for rod in found) == pytest.approx(np.pi / 2, abs=0.1)
+
+
+def test_the_rim_of_a_lampshade_is_no_rod() -> None:
+    """A ring, from which five petals of thin glass rise to the middle."""
+    rng = np.random.default_rng(4)
+    points, normals = ring(rng)
+    turn, out = rng.uniform(0, 2 * np.pi, 1000), 0.25 * np.sqrt(rng.uniform(0.2, 1, 1000))
+    petal = np.sin(5 * turn) > 0.5
+    turn, out = turn[petal], out[petal]
+    glass = np.stack([out * np.cos(turn), out * np.sin(turn), 0.6 * (0.25 - out)], axis=1)
+    up = np.stack([0.6 * np.cos(turn), 0.6 * np.sin(turn), np.ones(len(turn))], axis=1)
+    told = planes_of(np.concatenate([points, glass]), np.concatenate([normals, up]))
+    assert not rods(told, told.points, np.ones(len(told.points), bool), SPACING_M)[0]
 
 
 def test_tubes_are_closed_and_look_outward() -> None:
     nothing = Mesh(np.zeros(3), np.empty((0, 3), np.float32), np.empty((0, 3), np.int32))
     along = np.array([0.6, 0.0, 0.8])
-    two = (Rod(np.zeros(3), along, 0.5, 0.01), Rod(np.ones(3), -along, 0.3, 0.02))
+    two = (
+        Rod(np.array([np.zeros(3), 0.5 * along]), 0.01),
+        Rod(np.array([np.ones(3), np.ones(3) - 0.3 * along]), 0.02),
+    )
     mesh = with_tubes(nothing, two, 0.025)
     shape = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     assert shape.is_watertight
     wanted = np.pi * (0.5 * 0.01**2 + 0.3 * 0.02**2)
     assert abs(shape.volume / wanted - 1) < 0.05
+
+
+def test_a_bent_tube_is_closed_and_does_not_twist() -> None:
+    nothing = Mesh(np.zeros(3), np.empty((0, 3), np.float32), np.empty((0, 3), np.int32))
+    rod = Rod(handrail(np.arange(0, 6, 0.01)), HANDRAIL_M)
+    mesh = with_tubes(nothing, (rod,), 0.025)
+    shape = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    assert shape.is_watertight
+    assert shape.volume == pytest.approx(np.pi * HANDRAIL_M**2 * rod.length_m, rel=0.05)
+    along_m, off_m = rod.of(mesh.vertices[:-2])
+    assert np.abs(off_m).max() < 0.001
+    assert along_m.max() == pytest.approx(rod.length_m, abs=0.001)

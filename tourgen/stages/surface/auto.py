@@ -32,7 +32,7 @@ from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.stages.thin import voxel_groups
 
-VERSION = 6
+VERSION = 7
 Mask = npt.NDArray[np.bool_]
 
 

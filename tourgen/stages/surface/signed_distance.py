@@ -60,7 +60,7 @@ from tourgen.stages.surface.marching_cubes import (
 )
 from tourgen.stages.surface.meetings import met
 from tourgen.stages.surface.profiles import along_profiles
-from tourgen.stages.surface.rods import Rod, rods, with_tubes
+from tourgen.stages.surface.rods import rods
 from tourgen.stages.surface.samples import distinct_samples, require_range
 from tourgen.stages.surface.tangent_planes import (
     Smoothing,
@@ -68,8 +68,9 @@ from tourgen.stages.surface.tangent_planes import (
     noise_of,
     tangent_planes,
 )
+from tourgen.stages.surface.tubes import Rod, with_tubes
 
-VERSION = 9
+VERSION = 11
 _APART = 3.0
 """Spacings between points that stand apart."""
 _HANDFUL = 12
