@@ -28,6 +28,7 @@ _PIECE_M = 0.5
 """Length of the piece that a rod is told by, at most."""
 _SHORTEST_M = 0.25
 """The same, at least: what is shorter is as good as straight."""
+_POINTS = 12
 _CUBIC, _PARABOLA = 3, 2
 _STEP_M = 0.01
 """Between the places of an axis."""
@@ -92,6 +93,8 @@ def bent(points: Float32, normals: Float32, noise_m: float) -> Rod | None:
     reach = (points - points.mean(axis=0)) @ _main_way(points)
     inmost = points[np.abs(reach - np.median(reach)).argmin()]
     mine = np.linalg.norm(points - inmost, axis=1) < _PIECE_M / 2
+    if mine.sum() < _POINTS:
+        return None
     points, normals = points[mine], normals[mine]
     axis, middle = _main_way(points), points.mean(axis=0).astype(np.float64)
     half_m = float(np.abs((points - middle) @ axis).max())
