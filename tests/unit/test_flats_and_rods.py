@@ -74,6 +74,18 @@ def test_what_bends_stays_as_it_is() -> None:
     assert np.abs(radius - 0.4).max() < 3 * NOISE_M
 
 
+def test_a_floor_is_flat_though_its_normals_lean_a_little_toward_its_middle() -> None:
+    """A thousandth of a metre's turn a metre, as where stations' beams come in aslant."""
+    rng = np.random.default_rng(5)
+    points = rng.uniform(-2.5, 2.5, (60_000, 3))
+    points[:, 2] = rng.normal(0, NOISE_M / 2, len(points))
+    normals = rng.normal(0, 0.04, points.shape) - 0.001 * points
+    normals[:, 2] += 1
+    flat, flats = flattened(planes_of(points, normals), 0.02)
+    assert flats.broad.mean() > 0.99
+    assert np.abs(flat.points[:, 2]).max() < 0.0005
+
+
 def test_a_rail_seen_from_one_side_is_found_and_a_wall_is_none() -> None:
     rng = np.random.default_rng(1)
     (points, normals), (more, outward) = corner(rng), rail(rng)

@@ -44,6 +44,8 @@ _LEAST_AREA_M2 = 0.004
 _LEAST_SURFELS = 6
 _BENT = 0.45
 """What a paraboloid may explain of a patch, root mean square, in standard deviations."""
+_WIDE_M = 0.25
+"""Standard deviation across of a flat of which heights tell enough, at least."""
 _NARROW = 0.5
 """Standard deviation across of a strip's surfels, in their edges, at most."""
 _ROUNDS = 4
@@ -273,7 +275,9 @@ def _bends(points: Float64, normal: Float64, offset: float, most_m: float) -> bo
 def _straight(planes: TangentPlanes, label: Ints, flats: Flats) -> Ints:
     """(p + 1,) number of each flat; -1 where its normals turn as a bent surface's would, and last.
 
-    A strip may be too narrow for its surfels' heights to tell.
+    A strip may be too narrow for its surfels' heights to tell. Across a room they tell best, and
+    the least that its normals are wrong together comes to millimetres: a floor of five metres, seen
+    in 15 million points, was none for that.
 
     Args:
         planes: n tangent planes.
@@ -298,7 +302,8 @@ def _straight(planes: TangentPlanes, label: Ints, flats: Flats) -> Ints:
     bend = turned @ np.linalg.pinv(spread)
     height = np.einsum("ni,nij,nj->n", at, bend[label].astype(np.float32), at) / 2
     height -= mean(height).astype(np.float32)[label]
-    bent = np.sqrt(mean(np.square(height))) > _BENT * planes.noise_m
+    wide = np.linalg.eigvalsh(spread)[:, 0] > _WIDE_M**2
+    bent = ~wide & (np.sqrt(mean(np.square(height))) > _BENT * planes.noise_m)
     return np.append(np.where(bent, -1, np.arange(count)), -1)
 
 
