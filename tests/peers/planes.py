@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -253,7 +254,7 @@ def _meeting(one: Patch, other: Patch, low: Float64, high: Float64) -> tuple[Flo
 
 
 def _seen_aside(
-    truth: Truth, scene: object, patch: Patch, points: Float64, along: Float64
+    truth: Truth, scene: Any, patch: Patch, points: Float64, along: Float64
 ) -> Bools:
     """(n,) whether a station sees the patch a little beside each point of its edge."""
     seen = np.zeros(len(points), np.bool_)
@@ -266,13 +267,13 @@ def _seen_aside(
     return seen
 
 
-def _inner_edges(vertices: Float64, faces: Int32, near: object) -> tuple[Float64, Ints]:
+def _inner_edges(vertices: Float64, faces: Int32, near: Any) -> tuple[Float64, Ints]:
     """(e, 2, 3) ends and (e, 2) faces of the edges between two faces that lie near some points."""
     place = welded(vertices)[faces]
     corners = vertices[faces]
     middle = corners.mean(axis=1)
     size = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
-    away = near.query(middle)[0]  # type: ignore[attr-defined]
+    away = near.query(middle)[0]
     kept = np.flatnonzero(away < size + CREASE_REACH_M)
     a = place[kept][:, [0, 1, 2]].ravel()
     b = place[kept][:, [1, 2, 0]].ravel()
@@ -358,13 +359,13 @@ def _is_rod(grid: Float64) -> bool:
     return bool(rings.size and closed and np.abs(radius - RAIL_RADIUS_M).max() < 1e-4)
 
 
-def _distance(scene: object, points: Float64) -> Float64:
+def _distance(scene: Any, points: Float64) -> Float64:
     import open3d as o3d
 
     if not len(points):
         return np.zeros(0)
     asked = o3d.core.Tensor(np.ascontiguousarray(points, dtype=np.float32))
-    distance: Float64 = scene.compute_distance(asked).numpy()  # type: ignore[attr-defined]
+    distance: Float64 = scene.compute_distance(asked).numpy()
     return distance
 
 

@@ -186,8 +186,9 @@ def _carried_on(rod: Rod, tree: cKDTree, noise_m: float, spacing_m: float) -> Ro
     return Rod(axis[:last], rod.radius_m)
 
 
-def _meets(ahead: Float64, axis: Float64, near_m: float) -> bool:
-    """Whether a ring closes."""
+def _meets(ahead: Float64, axis: Float64, radius_m: float) -> bool:
+    """Whether a ring closes; however thin it is, it must not slip between two places of its own."""
+    near_m = max(radius_m, _STEP_M)
     return bool(len(axis) and np.linalg.norm(axis - ahead[-1], axis=1).min() < near_m)
 
 
