@@ -253,9 +253,7 @@ def _meeting(one: Patch, other: Patch, low: Float64, high: Float64) -> tuple[Flo
     return points[((points >= low) & (points <= high)).all(axis=1)], along
 
 
-def _seen_aside(
-    truth: Truth, scene: Any, patch: Patch, points: Float64, along: Float64
-) -> Bools:
+def _seen_aside(truth: Truth, scene: Any, patch: Patch, points: Float64, along: Float64) -> Bools:
     """(n,) whether a station sees the patch a little beside each point of its edge."""
     seen = np.zeros(len(points), np.bool_)
     across = np.cross(along, patch.normal)
