@@ -17,8 +17,9 @@ from tourgen.pipeline import RoomRecipe, RoomResult, planned, tour_recipes
 from tourgen.progress import Listener
 from tourgen.report import tour_report
 from tourgen.site import BuiltRoom, write_site
+from tourgen.threads import cores
 from tourgen.tour import Link, Tour, Viewpoint
-from tourgen.workers import build_rooms, cores
+from tourgen.workers import build_rooms
 
 _STEP_INSIDE_M = 0.9
 

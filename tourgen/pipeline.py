@@ -107,7 +107,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         stood,
         settings=ownership.Settings(),
         version=ownership.VERSION,
-        libraries=("scipy",),
+        libraries=("numba", "scipy"),
     )
     joined = task(
         "register",
@@ -115,7 +115,10 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         owned,
         settings=register.Settings(),
         version=register.VERSION,
-        libraries=("scipy",),
+        libraries=(
+            "numba",
+            "scipy",
+        ),
     )
     sifted = task(
         "sift",
@@ -123,9 +126,9 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         joined,
         settings=sift.Settings(min_points=room.clean.min_points),
         version=sift.VERSION,
-        libraries=("scipy",),
+        libraries=("numba", "scipy"),
     )
-    spaced = task("spacing", points.spaced, sifted, version=spacing.VERSION)
+    spaced = task("spacing", points.spaced, sifted, version=spacing.VERSION, libraries=("numba",))
     thinned = task(
         "thin",
         points.thinned,
@@ -141,7 +144,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         joined,
         settings=normals.Settings(),
         version=normals.VERSION,
-        libraries=("open3d", "scipy"),
+        libraries=("numba", "open3d", "scipy"),
     )
     oriented = task("floor", points.floored, turned, spaced, version=floor.VERSION)
     found = (
@@ -162,7 +165,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
             spaced,
             settings=surface.drawing(room.surface),
             version=surface.VERSION,
-            libraries=("open3d", "scipy"),
+            libraries=("numba", "open3d", "scipy"),
         )
     )
     trimmed = task(
@@ -174,7 +177,10 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         spaced,
         settings=surface.trimming(room),
         version=trim.VERSION,
-        libraries=("scipy",),
+        libraries=(
+            "numba",
+            "scipy",
+        ),
     )
     sound = task(
         "hygiene",
@@ -208,6 +214,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         joined,
         settings=exposure.Settings(),
         version=exposure.VERSION,
+        libraries=("numba", "scipy"),
     )
     unwrapped = task(
         "unwrap",
@@ -217,7 +224,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         scanned,
         settings=picture.Texels(room.texture.texel_mm),
         version=unwrap.VERSION,
-        libraries=("xatlas", "scipy"),
+        libraries=("numba", "xatlas", "scipy"),
     )
     baked = task(
         "bake",
@@ -230,7 +237,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         simplified,
         settings=bake.Settings(),
         version=bake.VERSION,
-        libraries=("open3d", "scipy"),
+        libraries=("numba", "open3d", "scipy"),
     )
     guessed = task(
         "inferred",
@@ -241,7 +248,10 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         spaced,
         settings=surface.Detail(detail_mm),
         version=inferred.VERSION,
-        libraries=("scipy",),
+        libraries=(
+            "numba",
+            "scipy",
+        ),
     )
     files = task(
         "pack",
@@ -281,7 +291,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         spaced,
         settings=surface.Detail(detail_mm),
         version=measure.VERSION,
-        libraries=("open3d", "scipy"),
+        libraries=("numba", "open3d", "scipy"),
     )
     summary = task(
         "summary",

@@ -6,15 +6,13 @@ Unwrap asks it whether charts overlap, bake asks it where each texel lies on the
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-if TYPE_CHECKING:
-    from tourgen.geometry import Float32, Float64, Int32
+from tourgen.compiled import compiled
+from tourgen.geometry import Float32, Float64, Int32
 
-_CANDIDATES_AT_ONCE = 2_000_000
 _FLAT = 1e-12  # square texels
 
 
@@ -54,68 +52,70 @@ def rasterize(triangles: Float64, width: int, height: int, reach: float = 0.0) -
     Returns:
         Fragments in the order of the triangles.
     """
-    size = np.array([width, height])
-    low = np.clip(np.floor(triangles.min(1) - 0.5 - reach).astype(np.int64) + 1, 0, size)
-    low = np.minimum(low, size - 1)
-    high = np.floor(triangles.max(1) - 0.5 + reach).astype(np.int64) + 1
-    spans = np.maximum(np.minimum(high, size) - low, 0)
-    counts = spans.prod(1)
-    ends = np.cumsum(counts)
-    pieces: list[Fragments] = []
-    first = 0
-    while first < len(triangles):
-        start = ends[first] - counts[first]
-        last = max(int(np.searchsorted(ends, start + _CANDIDATES_AT_ONCE)), first + 1)
-        pieces.append(_piece(triangles, low, spans, counts, first, last, reach))
-        first = last
-    if not pieces:
-        empty = np.zeros(0, np.int32)
-        return Fragments(empty, empty, empty, np.zeros((0, 3), np.float32))
-    return Fragments(
-        np.concatenate([piece.face for piece in pieces]),
-        np.concatenate([piece.row for piece in pieces]),
-        np.concatenate([piece.column for piece in pieces]),
-        np.concatenate([piece.barycentric for piece in pieces]),
-    )
+    first = np.zeros(len(triangles) + 1, np.int64)
+    _cover(triangles, width, height, reach, first, *_room(0))
+    np.cumsum(first, out=first)
+    face, row, column, barycentric = _room(int(first[-1]))
+    _cover(triangles, width, height, reach, first, face, row, column, barycentric)
+    return Fragments(face, row, column, barycentric)
 
 
-def _piece(
+def _room(count: int) -> tuple[Int32, Int32, Int32, Float32]:
+    face, row, column = np.empty((3, count), np.int32)
+    return face, row, column, np.empty((count, 3), np.float32)
+
+
+@compiled
+def _cover(
     triangles: Float64,
-    low: npt.NDArray[np.int64],
-    spans: npt.NDArray[np.int64],
-    counts: npt.NDArray[np.int64],
-    first: int,
-    last: int,
+    width: int,
+    height: int,
     reach: float,
-) -> Fragments:
-    """The fragments of triangles ``first`` to ``last``: every texel of a box, then a test."""
-    counts = counts[first:last]
-    face = np.repeat(np.arange(first, last, dtype=np.int32), counts)
-    within = np.arange(len(face)) - np.repeat(np.cumsum(counts) - counts, counts)
-    across = np.repeat(spans[first:last, 0], counts)
-    down = within // across
-    column = np.repeat(low[first:last, 0], counts) + within - down * across
-    row = np.repeat(low[first:last, 1], counts) + down
+    first: npt.NDArray[np.int64],
+    face: Int32,
+    row: Int32,
+    column: Int32,
+    barycentric: Float32,
+) -> None:
+    """Write the fragments of each triangle from ``first`` on.
 
-    corners = triangles[first:last]
-    edges = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)  # edge i faces corner i
-    double_area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    flat = np.abs(double_area) < _FLAT
-    # Shares of the corners, linear in column and row; a flat triangle gets thirds everywhere.
-    scale = np.where(flat, 0.0, 1 / np.where(flat, 1.0, double_area))
-    barycentric = np.empty((len(face), 3), np.float32)
-    keep = np.repeat(~flat | (reach > 0), counts)
-    for i in range(3):
-        start = corners[:, (i + 1) % 3]
-        by_row, by_column = edges[:, i, 0] * scale, -edges[:, i, 1] * scale
-        base = by_row * (0.5 - start[:, 1]) + by_column * (0.5 - start[:, 0])
-        base = np.where(flat, 1 / 3, base)
-        margin = -reach * np.hypot(by_row, by_column)
-        share = np.repeat(by_row, counts) * row
-        share += np.repeat(by_column, counts) * column
-        share += np.repeat(base, counts)
-        keep &= share >= np.repeat(margin, counts)
-        barycentric[:, i] = share
-    return Fragments(
-        face[keep], row[keep].astype(np.int32), column[keep].astype(np.int32), barycentric[keep]
-    )
+    Where there is no room for any, count them instead, into the place of the next triangle.
+    """
+    by_row, by_column, base, margin = np.empty((4, 3))
+    share = np.empty(3)
+    counting = len(face) == 0
+    for number in range(len(triangles)):
+        corner = triangles[number]
+        area = (corner[1, 0] - corner[0, 0]) * (corner[2, 1] - corner[0, 1])
+        area -= (corner[1, 1] - corner[0, 1]) * (corner[2, 0] - corner[0, 0])
+        flat = abs(area) < _FLAT
+        if flat and not reach > 0:
+            continue
+        scale = 0.0 if flat else 1 / area
+        for i in range(3):  # edge i faces corner i; shares are linear in column and row
+            start, end = corner[(i + 1) % 3], corner[(i + 2) % 3]
+            by_row[i], by_column[i] = (end[0] - start[0]) * scale, (start[1] - end[1]) * scale
+            base[i] = by_row[i] * (0.5 - start[1]) + by_column[i] * (0.5 - start[0])
+            if flat:
+                base[i] = 1 / 3
+            margin[i] = -reach * np.hypot(by_row[i], by_column[i])
+        left = max(int(np.floor(corner[:, 0].min() - 0.5 - reach)) + 1, 0)
+        right = min(int(np.floor(corner[:, 0].max() - 0.5 + reach)) + 1, width)
+        top = max(int(np.floor(corner[:, 1].min() - 0.5 - reach)) + 1, 0)
+        bottom = min(int(np.floor(corner[:, 1].max() - 0.5 + reach)) + 1, height)
+        at = first[number]
+        for r in range(top, bottom):
+            for c in range(left, right):
+                inside = True
+                for i in range(3):
+                    share[i] = by_row[i] * r + by_column[i] * c + base[i]
+                    inside &= share[i] >= margin[i]
+                if not inside:
+                    continue
+                if counting:
+                    first[number + 1] += 1
+                else:
+                    face[at], row[at], column[at] = number, r, c
+                    for i in range(3):
+                        barycentric[at, i] = share[i]
+                    at += 1

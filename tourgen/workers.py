@@ -14,12 +14,18 @@ from multiprocessing import get_context, parent_process
 from multiprocessing.queues import SimpleQueue
 from threading import Thread
 
+from tourgen import threads
 from tourgen.cache import Cache
 from tourgen.errors import StageError, TourgenError
 from tourgen.pipeline import RoomRecipe, RoomResult, build_room
 from tourgen.progress import Listener, Started
 
-_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    threads.VARIABLE,
+)
 
 _events: SimpleQueue[Started | None]
 
@@ -42,19 +48,14 @@ def build_rooms(
         return [_attempt(recipe, cache, listener) for recipe in recipes]
     context = get_context("spawn")  # libraries that start threads do not survive a fork
     events: SimpleQueue[Started | None] = context.SimpleQueue()
-    threads = max(1, cores() // jobs)
+    share = max(1, threads.cores() // jobs)
     with (
         _forwarding(events, listener),
-        _limited_threads(threads),
+        _limited_threads(share),
         ProcessPoolExecutor(jobs, context, _initialise, (events,)) as pool,
     ):
         futures = [pool.submit(_in_worker, recipe, cache) for recipe in recipes]
         return [_outcome(recipe, future) for recipe, future in zip(recipes, futures, strict=True)]
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _attempt(recipe: RoomRecipe, cache: Cache, listener: Listener) -> RoomResult | TourgenError:
@@ -115,10 +116,10 @@ def _forwarding(events: SimpleQueue[Started | None], listener: Listener) -> Iter
 
 
 @contextmanager
-def _limited_threads(threads: int) -> Iterator[None]:
+def _limited_threads(share: int) -> Iterator[None]:
     """Processes started inside see these limits; libraries read them when they load."""
     before = {name: os.environ.get(name) for name in _THREAD_VARIABLES}
-    os.environ.update(dict.fromkeys(_THREAD_VARIABLES, str(threads)))
+    os.environ.update(dict.fromkeys(_THREAD_VARIABLES, str(share)))
     try:
         yield
     finally:

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from tourgen.fitting.lengths import Corner, detail_m
 from tourgen.fitting.points import RoomScan, moved
@@ -24,10 +23,11 @@ from tourgen.geometry import (
     UvMesh,
     View,
 )
+from tourgen.neighbours import Neighbours
 from tourgen.scans import ReadFacts
 from tourgen.stages import bake, entry, inferred, levels, pack, poster, register, sift, unwrap
 from tourgen.stages.mesh_arrays import face_areas
-from tourgen.stages.spacing import Spacing, spacing_at
+from tourgen.stages.spacing import FOURTH, Spacing, spacing_at
 from tourgen.tileset import tileset_json
 from tourgen.tour import Viewpoint
 
@@ -107,14 +107,15 @@ def unwrapped(
     nearest panorama's pixels, down to the size asked for; a branch's are twice those below it; the
     root's make a picture of a fixed size.
     """
-    texel_m = _texels(room, cKDTree(cloud.points), scan.panoramas, asked.texel_mm / 1000)
+    texel_m = _texels(room, cloud.points, scan.panoramas, asked.texel_mm / 1000)
     return tuple(unwrap.unwrap(tile.mesh, unwrap.Settings(texel_m[tile.id])) for tile in room)
 
 
 def _texels(
-    room: tuple[Tile, ...], tree: cKDTree, panoramas: tuple[Panorama, ...], finest_m: float
+    room: tuple[Tile, ...], points: Float32, panoramas: tuple[Panorama, ...], finest_m: float
 ) -> dict[str, float]:
     rng = np.random.default_rng(0)
+    around = Neighbours.of(points, FOURTH)
     texel_m: dict[str, float] = {}
     for tile in reversed(room):  # children first
         if tile.children:
@@ -122,8 +123,8 @@ def _texels(
             continue
         vertices = tile.mesh.vertices
         sample = vertices[rng.choice(len(vertices), min(200, len(vertices)), replace=False)]
-        _, nearest = tree.query(sample)
-        spacing_m = spacing_at(tree, tree.data[nearest].astype(np.float32))
+        nearest = around.nearest(sample, 1)[0][:, 0]
+        spacing_m = spacing_at(around, points[nearest])
         density = 1 / np.maximum(spacing_m, 1e-6) ** 2 + _pixels_on(sample, panoramas)
         texel_m[tile.id] = max(finest_m, 0.5 * float(np.median(1 / np.sqrt(density))))
     root = room[0]

@@ -35,9 +35,10 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import ConvexHull, cKDTree
+from scipy.spatial import ConvexHull
 
 from tourgen.geometry import Float32, Float64, Mesh
+from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import regions, vertex_areas, vertex_normals
 
 _FACING = 0.5
@@ -67,9 +68,8 @@ def with_covers(mesh: Mesh, loose: Mask, cut: Mask, points: Float32, around_m: f
     at, patch = at[opened], patch[opened]
     if cut[at].all():
         return cut
-    _, found = cKDTree(mesh.vertices[at]).query(points, distance_upper_bound=around_m, workers=-1)
-    near = np.asarray(found)
-    around = np.flatnonzero(near < len(at))
+    near = Neighbours.of(mesh.vertices[at], 1).nearest(points, 1, around_m)[0][:, 0]
+    around = np.flatnonzero(near >= 0)
     patch_around = patch[near[around]]
     outward = -vertex_areas(mesh)[:, None] * vertex_normals(mesh) * cut[:, None]
     outside = cut[at]

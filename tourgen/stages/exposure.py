@@ -22,14 +22,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, PointCloud, UInt8
+from tourgen.neighbours import Neighbours
 from tourgen.stages import glare
 from tourgen.stages.burnt import ends
 from tourgen.stages.cells import cells_of
 
-VERSION = 4
+VERSION = 5
 
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
@@ -121,9 +121,8 @@ def _raise_clipped(
             of = compared & (cells.owner == station)
             if of.sum() >= settings.pair_cells:
                 own = np.flatnonzero(clipped[:, channel] & (owner == station))
-                _, near = cKDTree(middles[of]).query(
-                    cloud.points[own], k=range(1, _COMPARED + 1), workers=-1
-                )
+                compared_to = Neighbours.of(middles[of], _COMPARED)
+                near, _ = compared_to.nearest(cloud.points[own], min(_COMPARED, len(compared_to)))
                 value = np.clip(np.rint(np.median(there[of][near], axis=1)), 0, 255)
                 colors[own, channel] = np.maximum(colors[own, channel], value)
 

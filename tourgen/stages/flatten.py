@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from tourgen.compiled import compiled
 from tourgen.raster import rasterize
 from tourgen.stages.charts import numbered, sums, unit
 
@@ -222,9 +223,17 @@ def boxes(flat: Float64, owner: Int64) -> tuple[Float64, Float64]:
     """Lowest and highest (c, 2) of the (n, 2) points of each owner, numbered from 0."""
     count = int(owner.max()) + 1
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
-    np.minimum.at(low, owner, flat)
-    np.maximum.at(high, owner, flat)
+    _stretch(flat, owner, low, high)
     return low, high
+
+
+@compiled
+def _stretch(flat: Float64, owner: Int64, low: Float64, high: Float64) -> None:
+    """Stretch the box of each owner about its points."""
+    for i, own in enumerate(owner):
+        for k in range(2):
+            low[own, k] = min(low[own, k], flat[i, k])
+            high[own, k] = max(high[own, k], flat[i, k])
 
 
 def _signed_areas(corners: Float64) -> Float64:

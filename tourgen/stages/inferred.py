@@ -31,12 +31,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
-from tourgen.geometry import Float32, Float64, PointCloud, UInt8
-from tourgen.stages.spacing import spacing_at
+from tourgen.geometry import Float32, Float64, Int32, PointCloud, UInt8
+from tourgen.neighbours import Neighbours
+from tourgen.stages.spacing import FOURTH, spacing_at
 
-VERSION = 2
+VERSION = 3
 INFERRED = 255
 """Of a vertex that is a guess; 0 of one that is not."""
 _FEWEST = 5
@@ -93,14 +93,14 @@ def measured(
         else:
             nearest = _nearest(places, points)
         away_m = np.linalg.norm(places - points[nearest], axis=1)
-        apart_m = spacing_at(cKDTree(points), points)[nearest]
+        apart_m = spacing_at(Neighbours.of(points, FOURTH), points[nearest])
         found |= away_m <= np.maximum(settings.reach * apart_m, settings.detail_m)
     return found
 
 
-def _nearest(places: Float32, points: Float32) -> npt.NDArray[np.int64]:
+def _nearest(places: Float32, points: Float32) -> Int32:
     """(n,) which of (m, 3) points is nearest to each of (n, 3) places."""
-    return np.asarray(cKDTree(points).query(places, workers=-1)[1], np.int64)
+    return Neighbours.of(points, 1).nearest(places, 1)[0][:, 0]
 
 
 def _directions(way: Float32) -> Float32:

@@ -22,15 +22,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, OrientedCloud, PointCloud
+from tourgen.neighbours import Neighbours
 from tourgen.stages.free_side import face_free_space
 from tourgen.stages.sight import depth_buffer
-from tourgen.stages.spacing import spacing_at
+from tourgen.stages.spacing import FOURTH, spacing_at
 from tourgen.stages.tangent import tangent_planes
 
-VERSION = 2
+VERSION = 3
 _GRAZING, _SQUARE = 0.15, 0.25
 """Cosines: a point seen at less is not seen; one seen at more from both sides contradicts."""
 _SPACING_SAMPLE = 5_000
@@ -112,7 +112,7 @@ def _look_at_seeing(
 def _spacing(points: Float32) -> float:
     """Median distance between neighbouring points, metres."""
     chosen = np.random.default_rng(0).permutation(len(points))[:_SPACING_SAMPLE]
-    return float(np.median(spacing_at(cKDTree(points), points[chosen])))
+    return float(np.median(spacing_at(Neighbours.of(points, FOURTH), points[chosen])))
 
 
 def _seen(

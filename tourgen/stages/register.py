@@ -31,17 +31,17 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from tourgen.errors import InputError
 from tourgen.geometry import Float32, Float64, PointCloud
+from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import components
 from tourgen.stages.tangent import tangent_planes
 from tourgen.stages.thin import Settings as Voxel
 from tourgen.stages.thin import thin
 
-VERSION = 2
+VERSION = 3
 _NEIGHBOURS = (12, 32)
 _SAMPLES = 25_000
 _ROUNDS_A_REACH = 40
@@ -107,7 +107,7 @@ class _View:
         normals: (n, 3) float64, toward the station.
         shade: (n,) float64, brightness, logarithmic, mean 0.
         slope: (n, 3) float64, gradient of the brightness along the surface, 1/m.
-        tree: Of the points.
+        around: Of the points.
         sample: Indices of those that look for partners, in no order.
     """
 
@@ -115,7 +115,7 @@ class _View:
     normals: Float64
     shade: Float64
     slope: Float64
-    tree: cKDTree
+    around: Neighbours
     sample: npt.NDArray[np.int64]
 
 
@@ -225,22 +225,21 @@ def _view(cloud: PointCloud, stations: Float64, number: int, settings: Settings)
     normal[away] *= -1
     light = np.log1p(mine.colors.astype(np.float32).mean(axis=1))
     points = mine.points.astype(np.float64)
-    tree = cKDTree(points)
+    around = Neighbours.of(mine.points, _SHADES)
     rng = np.random.default_rng(int(number))
     return _View(
         points,
         normal.astype(np.float64),
         (light - light.mean()).astype(np.float64),
-        _slope(tree, mine.points, normal, light),
-        tree,
+        _slope(around, mine.points, normal, light),
+        around,
         rng.permutation(len(points))[:_SAMPLES],
     )
 
 
-def _slope(tree: cKDTree, points: Float32, normal: Float32, light: Float32) -> Float64:
+def _slope(around: Neighbours, points: Float32, normal: Float32, light: Float32) -> Float64:
     """Gradient of the brightness in the tangent plane of each point, by least squares."""
-    near = np.asarray(tree.query(points, k=np.arange(1, _SHADES + 1), workers=-1)[1])
-    near = np.minimum(near, len(points) - 1)
+    near = around.nearest(points, min(_SHADES, len(points)))[0]
     way = points[near] - points[:, None]
     way -= np.einsum("mkj,mj->mk", way, normal)[..., None] * normal[:, None]
     change = light[near] - light[:, None]
@@ -294,10 +293,8 @@ def _partners(
     turn, back = rotations[pair[0]], rotations[pair[1]]
     at = one.points[sample] @ turn.T + translations[pair[0]]
     looked_up = (at - translations[pair[1]]) @ back
-    away, near = map(
-        np.asarray, other.tree.query(looked_up, distance_upper_bound=reach_m, workers=-1)
-    )
-    met = np.flatnonzero(np.isfinite(away))
+    near = other.around.nearest(looked_up, 1, reach_m)[0][:, 0]
+    met = np.flatnonzero(near >= 0)
     mine, theirs = sample[met], near[met]
     normal = other.normals[theirs] @ back.T
     alike = np.einsum("ij,ij->i", one.normals[mine] @ turn.T, normal) > _ALIKE

@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, PointCloud
+from tourgen.neighbours import Neighbours
 from tourgen.stages.thin import voxel_groups
 
-VERSION = 1
+VERSION = 2
 _SAMPLE = 20_000
+FOURTH = 5
+"""A point and its four nearest neighbours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,16 +38,16 @@ def spacing(cloud: PointCloud) -> Spacing:
     order, starts = voxel_groups(cloud.points, 0.1)
     rng = np.random.default_rng(0)
     chosen = order[rng.choice(starts, min(_SAMPLE, len(starts)), replace=False)]
-    local = spacing_at(cKDTree(cloud.points), cloud.points[chosen])
+    local = spacing_at(Neighbours.of(cloud.points, FOURTH), cloud.points[chosen])
     fine, median = np.quantile(local, [0.25, 0.5])
     return Spacing(float(fine), float(median))
 
 
-def spacing_at(tree: cKDTree, points: Float32) -> Float32:
-    """Spacing around each of (n, 3) points of the tree's cloud, metres.
+def spacing_at(around: Neighbours, points: Float32) -> Float32:
+    """Spacing around each of (n, 3) points of a cloud, metres.
 
     From the distance r to the fourth neighbour: a disc of radius r holds four points, so a
     point has the area pi r² / 4.
     """
-    distance, _ = tree.query(points, k=[5], workers=-1)
-    return np.asarray(distance, np.float32).reshape(-1) * np.float32(np.sqrt(np.pi / 4))
+    _, away_m = around.nearest(points, FOURTH)
+    return away_m[:, -1] * np.float32(np.sqrt(np.pi / 4))

@@ -10,9 +10,9 @@ are there over 0.19, save for scraps of a palm's breadth.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Mesh
+from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import compact, components, face_adjacency, face_areas
 
 _LARGEST_M2 = 1.0
@@ -35,11 +35,9 @@ def without_specks(mesh: Mesh, points: Float32, support_m: float) -> Mesh:
         return mesh
     vertices, first = np.unique(mesh.faces[small], return_index=True)
     of_piece = piece[small][first // 3]
-    near = cKDTree(points).query(
-        mesh.vertices[vertices], distance_upper_bound=support_m, workers=-1
-    )[1]
-    borne = np.asarray(near) < len(points)
-    pairs = np.unique(np.stack([of_piece[borne], np.asarray(near)[borne]]), axis=1)
+    near = Neighbours.of(points, 1).nearest(mesh.vertices[vertices], 1, support_m)[0][:, 0]
+    borne = near >= 0
+    pairs = np.unique(np.stack([of_piece[borne], near[borne]]), axis=1)
     bearing = np.bincount(pairs[0], minlength=len(piece_area))
     wanted = _LEAST_DENSITY * len(points) / area.sum()
     speck = (bearing < wanted * piece_area) & (piece_area < _LARGEST_M2)

@@ -24,18 +24,15 @@ half of the time); a third round of competition (the same).
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
-import numpy.typing as npt
-from scipy.spatial import cKDTree
 
-from tourgen.geometry import Float32
+from tourgen.compiled import compiled
+from tourgen.geometry import Float32, Int32
+from tourgen.neighbours import Grid, Neighbours, nearest_to
+from tourgen.symmetric import axes_of
+from tourgen.threads import in_parts
 
-_CHUNK = 4000
-"""Points at a time: their neighbourhoods stay in the processor's cache."""
+_PART = 1 << 13
 _NOISE_SAMPLE = 20_000
 _RIVALS = 12
 _TUKEY = 3.0
@@ -44,7 +41,7 @@ _NOT_FLAT = 1.5
 """Times the noise: root mean square residual beyond which other planes may compete."""
 _ROUNDS = 3
 _LEAST_NOISE_M = 1e-4
-_Columns = tuple[Float32, Float32, Float32]
+_EVERYWHERE = np.float32(np.inf)
 
 
 def tangent_planes(points: Float32, first_neighbours: int, neighbours: int) -> Float32:
@@ -58,149 +55,185 @@ def tangent_planes(points: Float32, first_neighbours: int, neighbours: int) -> F
     Returns:
         (n, 3) unit normals; which of the two sides they look at is arbitrary.
     """
-    tree = cKDTree(points)
-    columns = _columns(points)
-    normal = np.empty_like(points)
-    first = min(first_neighbours, len(points))
-    wide = min(neighbours, len(points))
+    count, first, wide = (
+        len(points),
+        min(first_neighbours, len(points)),
+        min(neighbours, len(points)),
+    )
+    around = Neighbours.of(points, wide)
+    normal, refined = np.empty((2, count, 3), np.float32)
+    height_m = np.empty(count, np.float32)
 
-    def begin(part: slice) -> None:
-        normal[part] = _principal(*_around(tree, columns, points[part], first)[1])
+    def begin(start: int, end: int) -> None:
+        _begin(around.grid, start, end, first, normal, height_m)
 
-    def finish(part: slice) -> None:
-        index, offset = _around(tree, columns, points[part], wide)
-        refined[part] = _refined(normal, part, index, offset, noise_m)
+    in_parts(begin, count, _PART)
+    noise_m = _noise(height_m, first)
+    rivals = np.unique(np.geomspace(1, 0.65 * wide, _RIVALS).astype(np.int32) - 1)
 
-    _in_parts(begin, len(points))
-    noise_m = _noise(tree, points, normal, first)
-    refined = np.empty_like(points)
-    _in_parts(finish, len(points))
-    return refined
+    def finish(start: int, end: int) -> None:
+        _finish(around.grid, start, end, wide, rivals, normal, noise_m, refined)
 
-
-def _in_parts(job: Callable[[slice], None], count: int) -> None:
-    """Run chunk by chunk on all cores; numpy and the tree let go of the interpreter's lock."""
-    parts = [slice(start, start + _CHUNK) for start in range(0, count, _CHUNK)]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(job, parts))
+    in_parts(finish, count, _PART)
+    found = np.empty((count, 3), np.float32)
+    found[around.number] = refined
+    return found
 
 
-def _columns(points: Float32) -> _Columns:
-    """x, y and z apart: arithmetic over rows of three is several times slower."""
-    x, y, z = (np.ascontiguousarray(points[:, axis]) for axis in range(3))
-    return x, y, z
-
-
-def _around(
-    tree: cKDTree, columns: _Columns, points: Float32, count: int
-) -> tuple[npt.NDArray[np.int64], _Columns]:
-    """(m, k) nearest points, nearest first, and where they lie as seen from each of (m, 3)."""
-    index = np.asarray(tree.query(points, k=np.arange(1, count + 1))[1])
-    x, y, z = (column[index] - points[:, axis, None] for axis, column in enumerate(columns))
-    return index, (x, y, z)
-
-
-def _principal(x: Float32, y: Float32, z: Float32) -> Float32:
-    """Directions of least spread of m neighbourhoods of k points."""
-    centred = np.stack([column - column.mean(axis=1, keepdims=True) for column in (x, y, z)], 1)
-    return np.asarray(np.linalg.eigh(centred @ centred.transpose(0, 2, 1))[1][:, :, 0])
-
-
-def _noise(tree: cKDTree, points: Float32, normal: Float32, count: int) -> np.float32:
+def _noise(height_m: Float32, count: int) -> np.float32:
     """Standard deviation of the points about their planes, metres: the median over the cloud."""
-    chosen = np.random.default_rng(0).permutation(len(points))[:_NOISE_SAMPLE]
-    index = _around(tree, _columns(points), points[chosen], count)[0]
-    height = np.einsum("mkj,mj->mk", points[index], normal[chosen])
-    height -= height.mean(axis=1, keepdims=True)
+    chosen = np.random.default_rng(0).permutation(len(height_m))[:_NOISE_SAMPLE]
     freedom = max(count - 3, 1)  # a plane has three parameters
-    rms = np.sqrt(np.median((height**2).sum(axis=1) / freedom))
+    rms = float(np.median(height_m[chosen])) * np.sqrt(count / freedom)
     return np.float32(max(rms, _LEAST_NOISE_M))
 
 
-def _refined(
+@compiled
+def _begin(
+    grid: Grid, start: int, end: int, count: int, normal: Float32, height_m: Float32
+) -> None:
+    """The direction of least spread of the nearest points, and how far these lie off it."""
+    points = grid[0]
+    index, square = np.empty(count, np.int32), np.empty(count, np.float32)
+    size, axes = np.empty(3), np.empty((3, 3))
+    for i in range(start, end):
+        nearest_to(
+            grid, points[i, 0], points[i, 1], points[i, 2], _EVERYWHERE, _EVERYWHERE, index, square
+        )
+        x = y = z = xx = xy = xz = yy = yz = zz = 0.0
+        for k in index:
+            dx, dy, dz = (
+                points[k, 0] - points[i, 0],
+                points[k, 1] - points[i, 1],
+                points[k, 2] - points[i, 2],
+            )
+            x, y, z = x + dx, y + dy, z + dz
+            xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
+            yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
+        axes_of(
+            xx - x * x / count,
+            xy - x * y / count,
+            xz - x * z / count,
+            yy - y * y / count,
+            yz - y * z / count,
+            zz - z * z / count,
+            size,
+            axes,
+        )
+        normal[i] = axes[0]
+        height_m[i] = np.sqrt(max(size[0], 0.0) / count)
+
+
+@compiled
+def _finish(
+    grid: Grid,
+    start: int,
+    end: int,
+    count: int,
+    rivals: Int32,
     normal: Float32,
-    part: slice,
-    index: npt.NDArray[np.int64],
-    offset: _Columns,
     noise_m: np.float32,
-) -> Float32:
+    refined: Float32,
+) -> None:
     """The robust fit of some points."""
+    points = grid[0]
     limit = np.float32((_TUKEY * noise_m) ** 2)
-    own = normal[part].copy()
-    x, y, z = offset
-    distance = x * x + y * y + z * z
-    nearness = 1 - distance / (1.2 * distance[:, -1:] + np.float32(1e-12))
-    residual = np.square(_heights(offset, own)).mean(axis=1)
-    uneven = np.flatnonzero(residual > (_NOT_FLAT * noise_m) ** 2)
-    theirs = (x[uneven], y[uneven], z[uneven])
-    own[uneven] = _best_plane(normal, index[uneven], theirs, nearness[uneven], limit)
-    shift = np.zeros((len(own), 1), np.float32)
-    for _ in range(_ROUNDS):
-        height = _heights(offset, own)
-        weight = _biweight(np.square(height - shift), limit) * nearness
-        own, shift = _fitted(offset, own, height, weight)
-        np.clip(shift, -2 * noise_m, 2 * noise_m, out=shift)
-    return own
+    index, square = np.empty(count, np.int32), np.empty(count, np.float32)
+    x, y, z = np.empty((3, count), np.float32)
+    height, weight, nearness = np.empty((3, count), np.float32)
+    own, best = np.empty(3, np.float32), np.empty(3, np.float32)
+    for i in range(start, end):
+        nearest_to(
+            grid, points[i, 0], points[i, 1], points[i, 2], _EVERYWHERE, _EVERYWHERE, index, square
+        )
+        wide = np.float32(1.2) * square[count - 1] + np.float32(1e-12)
+        for k in range(count):
+            j = index[k]
+            x[k], y[k], z[k] = (
+                points[j, 0] - points[i, 0],
+                points[j, 1] - points[i, 1],
+                points[j, 2] - points[i, 2],
+            )
+            nearness[k] = 1 - square[k] / wide
+        own[:] = normal[i]
+        off = 0.0
+        for k in range(count):
+            off += (x[k] * own[0] + y[k] * own[1] + z[k] * own[2]) ** 2
+        if off / count > (_NOT_FLAT * noise_m) ** 2:
+            most = np.float32(-1)
+            for rival in rivals:
+                other = normal[index[rival]]
+                votes = np.float32(0)
+                for k in range(count):
+                    h = x[k] * other[0] + y[k] * other[1] + z[k] * other[2]
+                    close = max(1 - h * h / limit, np.float32(0))
+                    votes += close * close * nearness[k]
+                if votes > most:
+                    most = votes
+                    best[:] = other
+            own[:] = best
+        shift = np.float32(0)
+        for _ in range(_ROUNDS):
+            shift = _turn(x, y, z, nearness, own, shift, limit, height, weight)
+            shift = min(max(shift, -2 * noise_m), 2 * noise_m)
+        refined[i] = own
 
 
-def _best_plane(
-    normal: Float32,
-    index: npt.NDArray[np.int64],
-    offset: _Columns,
+@compiled
+def _turn(
+    x: Float32,
+    y: Float32,
+    z: Float32,
     nearness: Float32,
+    own: Float32,
+    shift: np.float32,
     limit: np.float32,
-) -> Float32:
-    """Of the planes of some neighbours the one that most neighbours lie close to."""
-    best = np.full(len(index), -1, np.float32)
-    winner = np.empty((len(index), 3), np.float32)
-    reach = index.shape[1]
-    for rival in np.unique(np.geomspace(1, 0.65 * reach, _RIVALS).astype(int) - 1):
-        plane = normal[index[:, rival]]
-        close = _biweight(np.square(_heights(offset, plane)), limit)
-        votes = np.einsum("mk,mk->m", close, nearness)
-        better = votes > best
-        best[better], winner[better] = votes[better], plane[better]
-    return winner
-
-
-def _fitted(
-    offset: _Columns, normal: Float32, height: Float32, weight: Float32
-) -> tuple[Float32, Float32]:
-    """Weighted least squares of the heights over the plane; new normals, and their heights."""
-    u, v = across(normal)
-    a, b = _heights(offset, u), _heights(offset, v)
-    total = weight.sum(axis=1, keepdims=True) + np.float32(1e-9)
-    weight = weight / total
-
-    def mean(values: Float32) -> Float32:
-        return np.asarray(np.einsum("mk,mk->m", weight, values))[:, None]
-
-    mean_a, mean_b, mean_h = mean(a), mean(b), mean(height)
-    a, b, rise = a - mean_a, b - mean_b, height - mean_h
-    aa, ab, bb, ah, bh = mean(a * a), mean(a * b), mean(b * b), mean(a * rise), mean(b * rise)
+    height: Float32,
+    weight: Float32,
+) -> np.float32:
+    """Weighted least squares of the heights over a plane: turns it; returns how high it lies."""
+    count = len(x)
+    ux, uy, uz, vx, vy, vz = _across(own[0], own[1], own[2])
+    total = ma = mb = mh = np.float32(0)
+    for k in range(count):
+        h = x[k] * own[0] + y[k] * own[1] + z[k] * own[2]
+        close = max(1 - (h - shift) * (h - shift) / limit, np.float32(0))
+        w = close * close * nearness[k]
+        height[k], weight[k] = h, w
+        total += w
+        ma += w * (x[k] * ux + y[k] * uy + z[k] * uz)
+        mb += w * (x[k] * vx + y[k] * vy + z[k] * vz)
+        mh += w * h
+    total += np.float32(1e-9)
+    ma, mb, mh = ma / total, mb / total, mh / total
+    aa = ab = bb = ah = bh = np.float32(0)
+    for k in range(count):
+        a = x[k] * ux + y[k] * uy + z[k] * uz - ma
+        b = x[k] * vx + y[k] * vy + z[k] * vz - mb
+        rise, w = height[k] - mh, weight[k]
+        aa, ab, bb = aa + w * a * a, ab + w * a * b, bb + w * b * b
+        ah, bh = ah + w * a * rise, bh + w * b * rise
+    aa, ab, bb, ah, bh = aa / total, ab / total, bb / total, ah / total, bh / total
     determinant = aa * bb - ab * ab
-    sound = determinant > 0.01 * (aa + bb) ** 2  # else they lie on a line, which tilts nothing
-    determinant = np.where(sound, determinant, 1)
-    slope_a: Float32 = np.where(sound, (ah * bb - bh * ab) / determinant, 0)
-    slope_b: Float32 = np.where(sound, (bh * aa - ah * ab) / determinant, 0)
-    turned = normal - slope_a * u - slope_b * v
-    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-    return turned, mean_h - slope_a * mean_a - slope_b * mean_b
+    if determinant <= np.float32(0.01) * (aa + bb) ** 2:  # they lie on a line, which tilts nothing
+        return mh
+    slope_a, slope_b = (ah * bb - bh * ab) / determinant, (bh * aa - ah * ab) / determinant
+    own[0] -= slope_a * ux + slope_b * vx
+    own[1] -= slope_a * uy + slope_b * vy
+    own[2] -= slope_a * uz + slope_b * vz
+    own /= np.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2)
+    return mh - slope_a * ma - slope_b * mb
 
 
-def _heights(offset: _Columns, direction: Float32) -> Float32:
-    """(m, k) coordinates of the neighbours along each point's direction."""
-    x, y, z = offset
-    height = x * direction[:, 0:1]
-    height += y * direction[:, 1:2]
-    height += z * direction[:, 2:3]
-    return height
-
-
-def _biweight(square: Float32, limit: np.float32) -> Float32:
-    weight = np.maximum(1 - square / limit, 0)
-    weight *= weight
-    return np.asarray(weight)
+@compiled
+def _across(
+    x: np.float32, y: np.float32, z: np.float32
+) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]:
+    """Two unit vectors across a normal (Duff et al. 2017)."""
+    sign = np.float32(1) if z >= 0 else np.float32(-1)
+    a = -1 / (sign + z)
+    b = x * y * a
+    return 1 + sign * x * x * a, sign * b, -sign * x, b, sign + y * y * a, -y
 
 
 def across(normal: Float32) -> tuple[Float32, Float32]:

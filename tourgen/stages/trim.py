@@ -22,9 +22,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
-from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud, PointCloud
+from tourgen.geometry import Float32, Mesh, OrientedCloud, PointCloud
+from tourgen.neighbours import Neighbours
 from tourgen.stages.bulges import mostly, without_bulges
 from tourgen.stages.covers import with_covers
 from tourgen.stages.free_space import free_space
@@ -39,7 +39,7 @@ from tourgen.stages.mesh_arrays import (
 )
 from tourgen.stages.specks import without_specks
 
-VERSION = 8
+VERSION = 9
 _ALIKE = 0.5
 """Cosine between a pane and its rest, at least."""
 _AROUND = 2.0
@@ -125,10 +125,9 @@ def _opened(mesh: Mesh, oriented: OrientedCloud, full: PointCloud, settings: Set
     return compact(drawn, ~_cut_faces(drawn, gone))
 
 
-def _distance_m(places: Float32, points: Float32, most_m: float) -> Float64:
+def _distance_m(places: Float32, points: Float32, most_m: float) -> Float32:
     """From each place to the nearest point, infinite where it is farther than ``most_m``."""
-    distance, _ = cKDTree(points).query(places, distance_upper_bound=most_m, workers=-1)
-    return np.asarray(distance)
+    return Neighbours.of(points, 1).nearest(places, 1, most_m)[1][:, 0]
 
 
 def _in_boxes(places: Float32, settings: Settings) -> Mask:
@@ -138,7 +137,7 @@ def _in_boxes(places: Float32, settings: Settings) -> Mask:
     return inside
 
 
-def _rim(mesh: Mesh, distance_m: Float64, gone: Mask, support_m: float) -> Mask:
+def _rim(mesh: Mesh, distance_m: Float32, gone: Mask, support_m: float) -> Mask:
     """The hardly supported vertices around an opening that look as it does: its pane's rest.
 
     The reveal of a window, which may be as hardly supported, looks across it.
@@ -147,14 +146,12 @@ def _rim(mesh: Mesh, distance_m: Float64, gone: Mask, support_m: float) -> Mask:
     if not gone.any() or not rim.any():
         return np.zeros(len(rim), bool)
     at, cut = np.flatnonzero(rim), np.flatnonzero(gone)
-    distance, near = cKDTree(mesh.vertices[cut]).query(
-        mesh.vertices[at], distance_upper_bound=support_m, workers=-1
-    )
+    near = Neighbours.of(mesh.vertices[cut], 1).nearest(mesh.vertices[at], 1, support_m)[0][:, 0]
     normal = vertex_normals(mesh)
-    found = np.isfinite(distance)
-    at, near = at[found], cut[np.asarray(near)[found]]
+    found = near >= 0
+    at, beside = at[found], cut[near[found]]
     rim = np.zeros(len(rim), bool)
-    rim[at[np.einsum("ij,ij->i", normal[at], normal[near]) > _ALIKE]] = True
+    rim[at[np.einsum("ij,ij->i", normal[at], normal[beside]) > _ALIKE]] = True
     return rim
 
 

@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from tourgen.geometry import Float64
     from tourgen.stages.charts import Bool, Int64
 
-VERSION = 2
+VERSION = 3
 
 _THIN = 2e-3  # texels; a thinner face is drawn as nothing
 _JOIN_ROUNDS = 3

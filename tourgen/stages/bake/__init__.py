@@ -37,7 +37,7 @@ __all__ = [
     "vistas",
 ]
 
-VERSION = 9
+VERSION = 10
 
 
 def bake(

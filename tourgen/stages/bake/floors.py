@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud, PointCloud
+from tourgen.neighbours import Neighbours
 from tourgen.rays import ray_scene, rays_of
 from tourgen.stages.bake.exemplars import continued
 from tourgen.stages.bake.points import Settings, color_index, of_points
 from tourgen.stages.bake.texels import Texels, to_bytes
 from tourgen.stages.floor import LAID
-from tourgen.stages.spacing import spacing_at
+from tourgen.stages.spacing import FOURTH, spacing_at
 
 Bool = npt.NDArray[np.bool_]
 
@@ -65,13 +65,13 @@ def _continued(
     near = cloud.take(np.abs(cloud.points[:, 2] - _with_one(cloud.points) @ plane) < _OFF_M)
     if not len(near):
         return np.empty((0, 3), np.float32), np.empty((0, 3), np.float32)
-    tree = cKDTree(near.points)
+    around = Neighbours.of(near.points, FOURTH)
     rng = np.random.default_rng(0)
     sample = near.points[rng.choice(len(near), min(_SAMPLES, len(near)), replace=False)]
     low = near.points[:, :2].min(0)
     extent_m = near.points[:, :2].max(0) - low
     pixel_m = max(
-        _PIXEL_OF_SPACING * float(np.median(spacing_at(tree, sample))),
+        _PIXEL_OF_SPACING * float(np.median(spacing_at(around, sample))),
         float(extent_m.max()) / _WIDEST_PX,
     )
     columns, rows = (int(np.ceil(side / pixel_m)) for side in extent_m)
@@ -79,7 +79,7 @@ def _continued(
     at = low + (np.stack([column, row], axis=1) + 0.5) * pixel_m
     places = np.column_stack([at, _with_one(at) @ plane]).astype(np.float32)
     own = _is_floor(places, surface)
-    told = np.isfinite(tree.query(places, distance_upper_bound=settings.reach_m)[0])
+    told = around.nearest(places, 1, settings.reach_m)[0][:, 0] >= 0
     shown = np.flatnonzero(told)
     picture = np.zeros((rows * columns, 3), np.float32)
     index = color_index(near, oriented, pixel_m)

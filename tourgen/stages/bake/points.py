@@ -19,25 +19,27 @@ Earlier, over 5,000 pixels of ten views, round bells of 0.25, 0.35 and 0.6 of th
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
+from tourgen.compiled import compiled
 from tourgen.errors import StageError
-from tourgen.geometry import Float32, Float64, OrientedCloud, PointCloud, UInt8
+from tourgen.geometry import Float32, OrientedCloud, PointCloud, UInt8
+from tourgen.neighbours import Grid, Neighbours, nearest_to
 from tourgen.stages.bake.texels import Texels, to_bytes, unit
+from tourgen.threads import in_parts
 
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
 
-_LEAF_POINTS = 24
 _LARGEST_CELL_M = 0.5
 _FEWER = 0.7
-_TEXELS_AT_ONCE = 100_000
-_POINTS_AT_ONCE = 500_000
+_BLOCKS_AT_ONCE = 1 << 12
+_ABOUT = 16
+"""Points that cells of an index are made for."""
 _NORMALS_NEAR = 8
 _CELL_OF_TEXEL = 0.75  # a level's cells are at most so large
 _SIGMA_OF_SPACING = 0.55  # narrow enough for letters a few points wide
@@ -71,17 +73,20 @@ class Level:
 
     Attributes:
         cell_m: Edge of a cell.
-        tree: Over ``points``.
-        points: (n, 3) float32.
-        normals: (n, 3) float32, unit.
-        colors: (n, 3) uint8.
+        around: The n points.
+        normals: (n, 3) float32, unit, as ``around`` sorts its points.
+        colors: (n, 3) uint8, likewise.
     """
 
     cell_m: float
-    tree: cKDTree
-    points: Float32
+    around: Neighbours
     normals: Float32
     colors: UInt8
+
+    @property
+    def points(self) -> Float32:
+        """(n, 3) float32, metres."""
+        return self.around.points
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +110,7 @@ def color_index(cloud: PointCloud, oriented: OrientedCloud, finest_texel_m: floa
         finest_texel_m: Detail below half of it is averaged away.
 
     Returns:
-        An index of about 90 bytes a cell of the finest level.
+        An index of about 45 bytes a cell of the finest level.
 
     Raises:
         StageError: Where either cloud is empty.
@@ -134,23 +139,22 @@ def _normals(cloud: PointCloud, oriented: OrientedCloud) -> Float32:
 
     A station sees one side of a thin board: the nearest of all may lie on the other.
     """
-    tree = cKDTree(oriented.cloud.points, leafsize=_LEAF_POINTS)
-    nearest = np.asarray(tree.query(cloud.points)[1], np.int64)
-    station = oriented.cloud.station
+    points, station = oriented.cloud.points, oriented.cloud.station
+    count = min(_NORMALS_NEAR, len(points))
+    around = Neighbours.of(points, count)
+    nearest = around.nearest(cloud.points, 1)[0][:, 0]
     others = np.flatnonzero(station[nearest] != cloud.station)
-    count = min(_NORMALS_NEAR, len(station))
-    for start in range(0, len(others), _POINTS_AT_ONCE):
-        some = others[start : start + _POINTS_AT_ONCE]
-        near = tree.query(cloud.points[some], k=np.arange(1, count + 1))[1]
-        first = (station[near] == cloud.station[some, None]).argmax(1)[:, None]
-        nearest[some] = np.take_along_axis(near, first, 1)[:, 0]
+    near = around.nearest(cloud.points[others], count)[0]
+    first = (station[near] == cloud.station[others, None]).argmax(1)[:, None]
+    nearest[others] = np.take_along_axis(near, first, 1)[:, 0]
     normals: Float32 = oriented.normals[nearest]
     return normals
 
 
 def _level(cell_m: float, points: Float32, normals: Float32, colors: Float32) -> Level:
-    tree = cKDTree(points, leafsize=_LEAF_POINTS, balanced_tree=False)
-    return Level(cell_m, tree, points, normals, to_bytes(colors))
+    around = Neighbours.of(points, _ABOUT)
+    order = around.number
+    return Level(cell_m, around, normals[order], to_bytes(colors[order]))
 
 
 def _averaged(
@@ -221,87 +225,28 @@ def of_points(
     return told
 
 
-@dataclass(frozen=True, slots=True)
-class _Nearby:
-    """The k points about each of b blocks, seen in the plane of the block.
+class _Lengths(NamedTuple):
+    """What the blend of a level goes by, metres."""
+
+    texel_m: np.float32
+    reach_m: np.float32
+    agree_cos: np.float32
+
+
+class _Blocks(NamedTuple):
+    """Blocks of texels, and the texels of each.
 
     Attributes:
-        x: (k, b) along the surface from the block's middle, metres.
-        y: (k, b)
-        off: (k, b) squared distance beyond noise off the surface; infinite for a point that
-            looks another way than the block.
-        colors: (3, k, b) float32.
-        spacing_m: (b,) of the points.
-        metric: (3, b) how distances along the surface are squared, xx, xy and yy; determinant 1.
-        alone: (b,) no point looks the block's way; all were taken instead.
+        middles: (b, 3)
+        normals: (b, 3)
+        starts: (b + 1,) where each block's texels begin in ``texel``.
+        texel: (t,) numbers of texels.
     """
 
-    x: Float32
-    y: Float32
-    off: Float32
-    colors: Float32
-    spacing_m: Float32
-    metric: Float32
-    alone: Bool
-
-
-def _nearby(
-    middles: Float64, normals: Float32, level: Level, texel_m: float, settings: Settings
-) -> _Nearby:
-    count = min(settings.neighbours, len(level.points))
-    distance, near = (
-        np.asarray(found).T for found in level.tree.query(middles, k=np.arange(1, count + 1))
-    )
-    # So many points lie in a disc of that radius.
-    several = min(_SPACING_POINTS, count)
-    spacing = distance[several - 1] * np.sqrt(np.pi / several)
-    spacing = np.maximum(spacing, 1e-6).astype(np.float32)
-    noise = np.maximum(spacing * _SIGMA_OF_SPACING, np.float32(_SIGMA_OF_TEXEL * texel_m))
-    right, up = _frames(normals)
-    offset = level.points[near] - middles.astype(np.float32)
-    x, y, above = (np.einsum("kbx,bx->kb", offset, axis) for axis in (right, up, normals))
-    # Noise lifts points off the surface: what counts is the distance along it, unless a point
-    # is off by more than noise.
-    off = np.maximum(np.abs(above) - noise, 0) ** 2
-    agrees = np.einsum("kbx,bx->kb", level.normals[near], normals) > settings.agree_cos
-    alone = ~agrees.any(0)
-    colors = np.stack([level.colors[near, i].astype(np.float32) for i in range(3)])
-    off = np.where(agrees | alone, off, np.float32(np.inf))
-    metric = _metric(x, y, colors, off <= 0, spacing)
-    return _Nearby(x, y, off, colors, spacing, metric, alone)
-
-
-def _metric(x: Float32, y: Float32, colors: Float32, usable: Bool, spacing_m: Float32) -> Float32:
-    """(3, b) how to square distances among k points of b blocks: long along edges of colour.
-
-    From the structure tensor: the mean square of the slopes between any two points, in their
-    direction.
-    """
-    tensor = np.zeros((3, len(spacing_m)), np.float32)
-    total = np.full(len(spacing_m), np.float32(1e-6))
-    least = np.square(_PAIR_OF_SPACING * spacing_m)
-    for one, other in itertools.combinations(range(len(x)), 2):
-        across, along = x[one] - x[other], y[one] - y[other]
-        step = colors[:, one] - colors[:, other]
-        weight = (usable[one] & usable[other]) / (across**2 + along**2 + least)
-        slope = weight**2 * np.einsum("cb,cb->b", step, step)
-        tensor += slope * np.stack([across * across, across * along, along * along])
-        total += weight
-    tensor /= total
-    middle = (tensor[0] + tensor[2]) / 2 + np.float32(_COLOR_NOISE**2)
-    spread = np.hypot((tensor[0] - tensor[2]) / 2, tensor[1])
-    steered = np.minimum((middle + spread) / np.maximum(middle - spread, 1), _MOST_STEERED)
-    angle = np.arctan2(2 * tensor[1], tensor[0] - tensor[2])
-    even, odd = (steered + 1 / steered) / 2, (steered - 1 / steered) / 2
-    turned = np.stack([even + odd * np.cos(angle), odd * np.sin(angle), even - odd * np.cos(angle)])
-    return np.asarray(turned, np.float32)
-
-
-def _frames(normals: Float32) -> tuple[Float32, Float32]:
-    """Two unit vectors across each unit normal."""
-    least = np.eye(3, dtype=np.float32)[np.abs(normals).argmin(1)]
-    right = unit(np.cross(least, normals))
-    return right, np.cross(normals, right)
+    middles: Float32
+    normals: Float32
+    starts: Int64
+    texel: Int64
 
 
 def _blend(
@@ -314,32 +259,181 @@ def _blend(
     told: Told,
 ) -> Bool:
     """Write n texels' part of ``told`` from one level; (n,) whether the level supports them."""
-    blocks, block = np.unique(texels.block[which], return_inverse=True)
-    normals = texels.normals[blocks]
-    middles = texels.middles[blocks]
-    right, up = _frames(normals)
-    offset = texels.positions[which] - middles.astype(np.float32)[block]
-    x = np.einsum("tx,tx->t", offset, right[block])
-    y = np.einsum("tx,tx->t", offset, up[block])
+    numbers, block, sizes = np.unique(texels.block[which], return_inverse=True, return_counts=True)
+    blocks = _Blocks(
+        texels.middles[numbers].astype(np.float32),
+        np.ascontiguousarray(texels.normals[numbers], np.float32),
+        np.concatenate([[0], np.cumsum(sizes)]),
+        which[np.argsort(block, kind="stable")],
+    )
     reach_m = max(settings.reach_m, _REACH_OF_SPACING * level.cell_m)
-    known = np.empty(len(which), bool)
-    nearby = _nearby(middles, normals, level, texel_m, settings)
-    for start in range(0, len(which), _TEXELS_AT_ONCE):
-        part = slice(start, start + _TEXELS_AT_ONCE)
-        of, to = block[part], which[part]
-        along, across = nearby.x[:, of] - x[part], nearby.y[:, of] - y[part]
-        off = nearby.off[:, of]
-        known[part] = ((along**2 + across**2 + off).min(0) <= reach_m**2) & ~nearby.alone[of]
-        xx, xy, yy = nearby.metric[:, of]
-        far = xx * along**2 + 2 * xy * along * across + yy * across**2 + off
-        nearest = far.min(0)
-        density = 1 / nearby.spacing_m[of] ** 2 + others[to]
-        sigma = np.maximum(_SIGMA_OF_SPACING / np.sqrt(density), _SIGMA_OF_TEXEL * texel_m)
-        half = 1 / (2 * sigma**2)
-        weight = np.exp((nearest - far) * half)
-        total = weight.sum(0)
-        for i in range(3):
-            told.colors[to, i] = (weight * nearby.colors[i][:, of]).sum(0) / total
-        told.mass[to] = total * np.exp(-nearest * half)
-        told.sigma_m[to] = sigma
-    return known
+    lengths = _Lengths(*map(np.float32, (texel_m, reach_m, settings.agree_cos)))
+    count = min(settings.neighbours, len(level.around))
+    known = np.zeros(len(texels.row), np.bool_)
+
+    def blend(first: int, last: int) -> None:
+        _blend_blocks(
+            first,
+            last,
+            count,
+            level.around.grid,
+            level.normals,
+            level.colors,
+            blocks,
+            texels.positions,
+            others,
+            lengths,
+            known,
+            (told.colors, told.mass, told.sigma_m),
+        )
+
+    in_parts(blend, len(numbers), _BLOCKS_AT_ONCE)
+    return known[which]
+
+
+@compiled
+def _blend_blocks(
+    first: int,
+    last: int,
+    count: int,
+    grid: Grid,
+    normals: Float32,
+    colors: UInt8,
+    blocks: _Blocks,
+    positions: Float32,
+    others: Float32,
+    lengths: _Lengths,
+    known: Bool,
+    told: tuple[Float32, Float32, Float32],
+) -> None:
+    """Blend the points about each of some blocks, seen in its plane, at its texels."""
+    points = grid[0]
+    index, square = np.empty(count, np.int32), np.empty(count, np.float32)
+    x, y, off, weight = np.empty((4, count), np.float32)
+    shade = np.empty((count, 3), np.float32)
+    frame, metric = np.empty((2, 3), np.float32), np.empty(3, np.float32)
+    reach2 = lengths.reach_m * lengths.reach_m
+    finest = np.float32(_SIGMA_OF_TEXEL) * lengths.texel_m
+    several = min(_SPACING_POINTS, count)
+    for block in range(first, last):
+        middle, normal = blocks.middles[block], blocks.normals[block]
+        nearest_to(
+            grid,
+            middle[0],
+            middle[1],
+            middle[2],
+            np.float32(np.inf),
+            np.float32(np.inf),
+            index,
+            square,
+        )
+        # So many points lie in a disc of that radius.
+        spacing_m = np.sqrt(square[several - 1] * np.float32(np.pi / several))
+        spacing_m = max(spacing_m, np.float32(1e-6))
+        noise_m = max(spacing_m * np.float32(_SIGMA_OF_SPACING), finest)
+        _across(normal, frame)
+        alone = True
+        for k in range(count):
+            j = index[k]
+            alike = np.float32(0)
+            for i in range(3):
+                alike += normals[j, i] * normal[i]
+            if alike > lengths.agree_cos:
+                alone = False
+        for k in range(count):
+            j = index[k]
+            right = up = above = alike = np.float32(0)
+            for i in range(3):
+                offset = points[j, i] - middle[i]
+                right += offset * frame[0, i]
+                up += offset * frame[1, i]
+                above += offset * normal[i]
+                alike += normals[j, i] * normal[i]
+                shade[k, i] = colors[j, i]
+            x[k], y[k] = right, up
+            # Noise lifts points off the surface: what counts is the distance along it, unless a
+            # point is off by more than noise, or looks another way.
+            beyond = max(abs(above) - noise_m, np.float32(0))
+            off[k] = beyond * beyond if alone or alike > lengths.agree_cos else np.inf
+        _steer(x, y, off, shade, spacing_m, metric)
+        for texel in blocks.texel[blocks.starts[block] : blocks.starts[block + 1]]:
+            at_x = at_y = np.float32(0)
+            for i in range(3):
+                offset = positions[texel, i] - middle[i]
+                at_x += offset * frame[0, i]
+                at_y += offset * frame[1, i]
+            near = nearest = np.float32(np.inf)
+            for k in range(count):
+                along, across = x[k] - at_x, y[k] - at_y
+                near = min(near, along * along + across * across + off[k])
+                weight[k] = metric[0] * along * along + 2 * metric[1] * along * across
+                weight[k] += metric[2] * across * across + off[k]
+                nearest = min(nearest, weight[k])
+            known[texel] = near <= reach2 and not alone
+            density = 1 / (spacing_m * spacing_m) + others[texel]
+            sigma = max(np.float32(_SIGMA_OF_SPACING) / np.sqrt(density), finest)
+            half = 1 / (2 * sigma * sigma)
+            total = red = green = blue = np.float32(0)
+            for k in range(count):
+                w = np.exp((nearest - weight[k]) * half)
+                total += w
+                red += w * shade[k, 0]
+                green += w * shade[k, 1]
+                blue += w * shade[k, 2]
+            told[0][texel, 0] = red / total
+            told[0][texel, 1] = green / total
+            told[0][texel, 2] = blue / total
+            told[1][texel] = total * np.exp(-nearest * half)
+            told[2][texel] = sigma
+
+
+@compiled
+def _across(normal: Float32, frame: Float32) -> None:
+    """Write two unit vectors across a unit normal."""
+    least = np.argmin(np.abs(normal))
+    one, other = (least + 1) % 3, (least + 2) % 3
+    length = np.sqrt(normal[one] ** 2 + normal[other] ** 2)
+    frame[0, least] = 0
+    frame[0, one], frame[0, other] = -normal[other] / length, normal[one] / length
+    for i in range(3):
+        a, b = (i + 1) % 3, (i + 2) % 3
+        frame[1, i] = normal[a] * frame[0, b] - normal[b] * frame[0, a]
+
+
+@compiled
+def _steer(
+    x: Float32, y: Float32, off: Float32, shade: Float32, spacing_m: np.float32, metric: Float32
+) -> None:
+    """Write how to square distances among points: long along edges of colour; xx, xy and yy.
+
+    From the structure tensor: the mean square of the slopes between any two points, in their
+    direction.
+    """
+    least = (np.float32(_PAIR_OF_SPACING) * spacing_m) ** 2
+    xx = xy = yy = np.float32(0)
+    total = np.float32(1e-6)
+    for one in range(len(x)):
+        if off[one] > 0:
+            continue
+        for other in range(one + 1, len(x)):
+            if off[other] > 0:
+                continue
+            across, along = x[one] - x[other], y[one] - y[other]
+            step = np.float32(0)
+            for i in range(3):
+                step += (shade[one, i] - shade[other, i]) ** 2
+            weight = 1 / (across * across + along * along + least)
+            slope = weight * weight * step
+            xx += slope * across * across
+            xy += slope * across * along
+            yy += slope * along * along
+            total += weight
+    xx, xy, yy = xx / total, xy / total, yy / total
+    middle = (xx + yy) / 2 + np.float32(_COLOR_NOISE * _COLOR_NOISE)
+    spread = np.sqrt(((xx - yy) / 2) ** 2 + xy * xy)
+    most = (middle + spread) / max(middle - spread, np.float32(1))
+    steered = min(most, np.float32(_MOST_STEERED))
+    angle = np.arctan2(2 * xy, xx - yy)
+    even, odd = (steered + 1 / steered) / 2, (steered - 1 / steered) / 2
+    metric[0], metric[2] = even + odd * np.cos(angle), even - odd * np.cos(angle)
+    metric[1] = odd * np.sin(angle)

@@ -28,9 +28,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64
+from tourgen.neighbours import Neighbours
 from tourgen.stages.ownership.grid import Grid, fitted, polished
 from tourgen.stages.ownership.settings import Settings
 from tourgen.stages.ownership.windows import (
@@ -42,11 +42,12 @@ from tourgen.stages.ownership.windows import (
     rough,
     windows_about,
 )
+from tourgen.threads import each, in_parts
 
 __all__ = ["VERSION", "Ownership", "Settings", "ownership"]
 
-VERSION = 5
-_BLOCK = 1_000_000
+VERSION = 6
+_BLOCK = 200_000
 _ABOUT_M = 0.03
 """How uncertain a place is that was found by its blind disc."""
 
@@ -78,15 +79,14 @@ def ownership(points: Float32, stations: Float64, settings: Settings) -> Ownersh
         of each point where moreover nearly all points lie on a grid. The few that lie on none
         follow the nearest that does.
     """
-    rng = np.random.default_rng(0)
     nobody = np.full(len(points), -1, np.int16)
-    found = []
-    for place in stations:
-        grid = _grid(points, place, settings, rng)
-        if grid is None:
-            return Ownership(nobody, stations)
-        found.append(grid)
-    if not found:
+
+    def sought(number: int) -> Grid | None:
+        return _grid(points, stations[number], settings, np.random.default_rng([0, number]))
+
+    grids = each(sought, range(len(stations)))
+    found = [grid for grid in grids if grid is not None]
+    if not found or len(found) < len(grids):
         return Ownership(nobody, stations)
     places = np.array([grid.place for grid in found])
     owner = _nearest_grid(points, found, settings.most_off)
@@ -94,22 +94,25 @@ def ownership(points: Float32, stations: Float64, settings: Settings) -> Ownersh
     if known.mean() < settings.least_matched:
         return Ownership(nobody, places)
     if not known.all():
-        _, near = cKDTree(points[known]).query(points[~known], workers=-1)
-        owner[~known] = owner[known][near]
+        near, _ = Neighbours.of(points[known], 1).nearest(points[~known], 1)
+        owner[~known] = owner[known][near[:, 0]]
     return Ownership(owner, places)
 
 
 def _nearest_grid(points: Float32, grids: list[Grid], most_off: float) -> npt.NDArray[np.int16]:
     """Number of the grid that each point lies on, -1 where it lies on none."""
     owner = np.full(len(points), -1, np.int16)
-    for start in range(0, len(points), _BLOCK):
-        block = points[start : start + _BLOCK]
+
+    def own(first: int, last: int) -> None:
+        block = points[first:last]
         best = np.full(len(block), most_off, np.float32)
         for number, grid in enumerate(grids):
             off = grid.off(block)
             nearer = off < best
             best[nearer] = off[nearer]
-            owner[start : start + _BLOCK][nearer] = number
+            owner[first:last][nearer] = number
+
+    in_parts(own, len(points), _BLOCK)
     return owner
 
 

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64
+from tourgen.neighbours import Neighbours
 from tourgen.stages.sift.nearby import nearby
 
 Mask = npt.NDArray[np.bool_]
@@ -61,7 +61,7 @@ def rejoined(
             break
         rest = np.flatnonzero(~back)
         own = points[at[rest]]
-        distance, index = map(np.asarray, cKDTree(kept).query(own, k=_NEIGHBOURS, workers=-1))
+        index, distance = Neighbours.of(kept, _NEIGHBOURS).nearest(own, _NEIGHBOURS)
         fits = distance[:, 0] < near_m
         wide = distance[:, -1] < reach_m[rest]
         fits[wide] |= _on_surface(

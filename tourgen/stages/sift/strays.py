@@ -17,10 +17,10 @@ import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from tourgen.geometry import Float32, Int32
+from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import components
 
 Mask = npt.NDArray[np.bool_]
-_BLOCK = 500_000
 _SPOT_M = 1e-4
 _CRUMB = 60
 """Fewest points that are a thing of their own."""
@@ -37,29 +37,21 @@ def isolated(points: Float32, suspect: Mask, neighbours: int, ratio: float) -> M
     count = min(neighbours, len(points) - 1)
     if not len(asked) or count < 1:
         return found
-    tree = cKDTree(points)
-    own, near = _around(tree, points, asked, count)
+    cloud = Neighbours.of(points, count)
+    own, near = _around(cloud, points[asked], count)
     # Only what is farther from its neighbours than most points can be a stray.
     far = own > ratio * max(float(np.quantile(own, 0.1)), _SPOT_M)
     asked, own, near = asked[far], own[far], near[far]
     others, inverse = np.unique(near, return_inverse=True)
-    theirs = _around(tree, points, others, count)[0][inverse].reshape(near.shape)
+    theirs = _around(cloud, points[others], count)[0][inverse].reshape(near.shape)
     found[asked] = own > ratio * np.maximum(np.median(theirs, axis=1), _SPOT_M)
     return found
 
 
-def _around(
-    tree: cKDTree, points: Float32, at: npt.NDArray[np.signedinteger], count: int
-) -> tuple[Float32, Int32]:
-    """Mean distance of the points ``at`` to their neighbours, and which these are."""
-    distance_m = np.empty(len(at), np.float32)
-    near = np.empty((len(at), count), np.int32)
-    nearest = np.arange(2, count + 2)  # the first is the point itself
-    for start in range(0, len(at), _BLOCK):
-        part = slice(start, start + _BLOCK)
-        distance, near[part] = tree.query(points[at[part]], k=nearest, workers=-1)
-        distance_m[part] = np.asarray(distance).mean(axis=1)
-    return distance_m, near
+def _around(cloud: Neighbours, places: Float32, count: int) -> tuple[Float32, Int32]:
+    """Mean distance of some points to their neighbours, and which these are."""
+    near, away_m = cloud.nearest(places, count + 1)
+    return away_m[:, 1:].mean(axis=1), near[:, 1:]  # the first is the point itself
 
 
 def clusters(points: Float32, gap_m: float) -> Int32:

@@ -23,16 +23,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Mesh, OrientedCloud, PointCloud
+from tourgen.neighbours import Neighbours
 from tourgen.rays import ray_scene
 from tourgen.stages.mesh_arrays import face_areas, vertex_normals
 from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.stages.thin import voxel_groups
 
-VERSION = 7
+VERSION = 8
 Mask = npt.NDArray[np.bool_]
 
 
@@ -115,10 +115,8 @@ def _share(mesh: Mesh, planes: TangentPlanes, most_m: float) -> float:
 
 def _near(mesh: Mesh, planes: TangentPlanes, most_m: float) -> Mask:
     """Which faces of a mesh have a corner within ``most_m`` of a plane's point."""
-    distance, _ = cKDTree(planes.points).query(
-        mesh.vertices, distance_upper_bound=most_m, workers=-1
-    )
-    return np.asarray(np.isfinite(distance)[mesh.faces].any(axis=1))
+    near, _ = Neighbours.of(planes.points, 1).nearest(mesh.vertices, 1, most_m)
+    return np.asarray((near[:, 0] >= 0)[mesh.faces].any(axis=1))
 
 
 class _Closed:

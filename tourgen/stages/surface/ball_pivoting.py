@@ -19,12 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from tourgen.errors import InputError, StageError
 from tourgen.geometry import Float32, Mesh, OrientedCloud
+from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import compact, edges, face_normals
-from tourgen.stages.spacing import spacing_at
+from tourgen.stages.spacing import FOURTH, spacing_at
 from tourgen.stages.surface.samples import distinct_samples, require_range
 
 VERSION = 1
@@ -116,7 +116,7 @@ def _require_match(points: Float32, first_m: float) -> None:
         return
     rng = np.random.default_rng(0)
     sample = points[rng.choice(len(points), min(_SAMPLE, len(points)), replace=False)]
-    dense_m, median_m = np.quantile(spacing_at(cKDTree(points), sample), [0.1, 0.5])
+    dense_m, median_m = np.quantile(spacing_at(Neighbours.of(points, FOURTH), sample), [0.1, 0.5])
     low_m, high_m = _FIRST[0] * median_m, _FIRST[1] * dense_m
     if not low_m <= first_m <= high_m:
         raise InputError(

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-import numpy.typing as npt
-from scipy.spatial import cKDTree
 
-from tourgen.geometry import Float32
+from tourgen.compiled import compiled
+from tourgen.geometry import Float32, Int32
+from tourgen.neighbours import Grid, Neighbours, nearest_to
 from tourgen.stages.surface.growing import distinct
 from tourgen.stages.surface.marching_cubes import Keys, corner_of, key_of
 from tourgen.stages.surface.tangent_planes import TangentPlanes
+from tourgen.threads import in_parts
 
-_CHUNK = 1 << 17
+_PART = 1 << 14
 _ACROSS = 0.1
 """Share of the weight across a crease from which on it is one."""
 _DENSEST, _SPARSEST = 0.5, 2.0
@@ -22,27 +21,6 @@ _FADE = 0.3
 """Last part of a plane's reach over which another surface may take over."""
 _MARGIN = 0.2
 """How far the grid goes on around the points, in their extent: a surface that closes gaps may."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Sides:
-    """The planes near n places, on the side of the nearest one and across a crease from it.
-
-    Attributes:
-        far: (n,) how far off the nearest plane's point lies, in its reach.
-        here: (n,) distance to those like the nearest.
-        across: (n,) distance to the others.
-        normals: (2, n, 3) mean normal of either side, not of unit length.
-        share: (n,) how much of a crease there is, 0 to 1.
-        edge: (n,) whether it is an edge, no corner.
-    """
-
-    far: Float32
-    here: Float32
-    across: Float32
-    normals: Float32
-    share: Float32
-    edge: npt.NDArray[np.bool_]
 
 
 class Field:
@@ -64,11 +42,16 @@ class Field:
         blend: int,
     ) -> None:
         own_m = np.clip(planes.spacing_m, _DENSEST * spacing_m, _SPARSEST * spacing_m)
-        self._planes = planes
-        self._reach_m = np.float32(reach) * own_m + np.float32(planes.noise_m)
+        reach_m = np.float32(reach) * own_m + np.float32(planes.noise_m)
         self._alike = np.float32(np.cos(np.radians(2 * crease_deg)))
         self._count = min(blend + 1, len(planes.points))
-        self._tree = cKDTree(planes.points)
+        around = Neighbours.of(planes.points, self._count)
+        order = around.number
+        self._grid, self._normals, self._reach_m = (
+            around.grid,
+            planes.normals[order],
+            reach_m[order],
+        )
         self.cell_m = np.float32(cell_m)
         low = planes.points.min(axis=0)
         extent_m = np.float32((planes.points.max(axis=0) - low).max())
@@ -85,72 +68,141 @@ class Field:
 
     def distance(self, key: Keys) -> Float32:
         """(n,) distances at (n,) corners, NaN where unknown."""
-        parts = [self._distance(key[at : at + _CHUNK]) for at in range(0, len(key), _CHUNK)]
-        return np.concatenate([np.empty(0, np.float32), *parts])
-
-    def normal(self, places: Float32) -> Float32:
-        """(n, 3) unit normals at (n, 3) places on the surface, NaN where unknown."""
-        parts = [self._normal(places[at : at + _CHUNK]) for at in range(0, len(places), _CHUNK)]
-        return np.concatenate([np.empty((0, 3), np.float32), *parts])
+        distance, far = self._told(key)
+        distance[~(far < 1)] = np.nan
+        return distance
 
     def faded(self, key: Keys) -> tuple[Float32, Float32]:
         """(n,) distances at (n,) corners, and how much they are worth, 1 to 0 where unknown."""
-        sides = self._sides(self.places(key))
-        return _between(sides), np.clip((1 - sides.far) / np.float32(_FADE), 0, 1)
+        distance, far = self._told(key)
+        return distance, np.clip((1 - far) / np.float32(_FADE), 0, 1)
 
-    def _distance(self, key: Keys) -> Float32:
-        sides = self._sides(self.places(key))
-        return np.where(sides.far < 1, _between(sides), np.float32(np.nan))
+    def normal(self, places: Float32) -> Float32:
+        """(n, 3) unit normals at (n, 3) places on the surface, NaN where unknown.
 
-    def _normal(self, places: Float32) -> Float32:
-        """Of that side of a crease on whose planes the place lies."""
-        sides = self._sides(places)
-        other = (sides.share > 0) & (np.abs(sides.across) < np.abs(sides.here))
-        normal = np.where(other[:, None], sides.normals[1], sides.normals[0])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
-        return np.where((sides.far < 1)[:, None], normal, np.float32(np.nan))
+        Of that side of a crease on whose planes the place lies.
+        """
+        _, _, normal = self._at(places, True)
+        return normal
 
-    def _sides(self, place: Float32) -> _Sides:
-        rank = np.arange(1, self._count + 1)
-        distance, index = self._tree.query(place, k=rank, workers=-1)
-        away, near = np.asarray(distance, np.float32), np.asarray(index)
-        points, normals = self._planes.points[near], self._planes.normals[near]
-        offset = place[:, None] - points
-        height = np.einsum("ikj,ikj->ik", offset, normals)
-        reach_m = self._reach_m[near[:, 0]]
-        foot_m2 = np.square(away[:, 0]) - np.square(height[:, 0])
-        far = np.sqrt(np.maximum(foot_m2, np.square(height[:, 0]))) / reach_m
-        weight = np.square(1 - np.square(away / np.maximum(away[:, -1:], 1e-9)))
-        weight[:, 0] += np.float32(1e-6)  # all may be equally far
-        weight /= weight.sum(axis=1, keepdims=True)
-        alike = np.einsum("ij,ikj->ik", normals[:, 0], normals) > self._alike
-        mine, others = weight * alike, weight * ~alike
-        here, normal = _over_round(mine, normals, offset, height)
-        across, beyond = _over_round(others, normals, offset, height)
-        between = points - points[:, :1]
-        rise = np.einsum("ij,ikj->ik", normals[:, 0], between)
-        rise -= np.einsum("ikj,ikj->ik", normals, between)
-        edge = (others * rise).sum(axis=1) < 0
-        share = np.minimum(others.sum(axis=1) / np.float32(_ACROSS), 1)
-        return _Sides(far, here, across, np.stack([normal, beyond]), share, edge)
+    def _told(self, key: Keys) -> tuple[Float32, Float32]:
+        distance, far, _ = self._at(self.places(key), False)
+        return distance, far
+
+    def _at(self, places: Float32, looks: bool) -> tuple[Float32, Float32, Float32]:
+        """(n,) distances, (n,) how far off the nearest plane's point, in its reach; normals."""
+        count = len(places)
+        distance, far = np.empty((2, count), np.float32)
+        normal = np.empty((count if looks else 0, 3), np.float32)
+
+        def tell(first: int, last: int) -> None:
+            _tell(
+                self._grid,
+                self._normals,
+                self._reach_m,
+                self._count,
+                self._alike,
+                places[first:last],
+                distance[first:last],
+                far[first:last],
+                normal[first:last],
+            )
+
+        in_parts(tell, count, _PART)
+        return distance, far, normal
 
 
-def _between(sides: _Sides) -> Float32:
-    """At an edge or a thin wall a place is in front of one side, in a corner of both."""
-    here, across = sides.here, sides.across
-    both = np.where(sides.edge, np.maximum(here, across), np.minimum(here, across))
-    return np.asarray(here + sides.share * (both - here), np.float32)
+@compiled
+def _tell(
+    grid: Grid,
+    normals: Float32,
+    reach_m: Float32,
+    count: int,
+    alike: np.float32,
+    places: Float32,
+    distance: Float32,
+    far: Float32,
+    normal: Float32,
+) -> None:
+    """Write what the nearest planes tell of some places; normals where there is room for them."""
+    points = grid[0]
+    # Farther off, either the height over a plane or the way to its point is more than its reach.
+    lone = 2 * reach_m.max() ** 2
+    index, square = np.empty(count, np.int32), np.empty(count, np.float32)
+    height = np.empty(count, np.float32)
+    mine, others = np.empty(count, np.float32), np.empty(count, np.float32)
+    normal_here, normal_across = np.empty(3, np.float32), np.empty(3, np.float32)
+    for i in range(len(places)):
+        x, y, z = places[i, 0], places[i, 1], places[i, 2]
+        if nearest_to(grid, x, y, z, np.float32(np.inf), lone, index, square) < count:
+            distance[i], far[i] = 0, np.inf
+            if len(normal):
+                normal[i] = np.nan
+            continue
+        first = index[0]
+        last = max(square[count - 1], np.float32(1e-18))
+        total = rest = rise = np.float32(0)
+        for k in range(count):
+            j = index[k]
+            nx, ny, nz = normals[j, 0], normals[j, 1], normals[j, 2]
+            height[k] = (x - points[j, 0]) * nx + (y - points[j, 1]) * ny + (z - points[j, 2]) * nz
+            weight = (1 - square[k] / last) ** 2
+            if k == 0:
+                weight += np.float32(1e-6)  # all may be equally far
+            total += weight
+            ax, ay, az = normals[first, 0], normals[first, 1], normals[first, 2]
+            if ax * nx + ay * ny + az * nz > alike:
+                mine[k], others[k] = weight, 0
+            else:
+                mine[k], others[k] = 0, weight
+                rest += weight
+                away = (ax - nx) * (points[j, 0] - points[first, 0])
+                away += (ay - ny) * (points[j, 1] - points[first, 1])
+                rise += weight * (away + (az - nz) * (points[j, 2] - points[first, 2]))
+        foot = max(square[0] - height[0] ** 2, height[0] ** 2)
+        far[i] = np.sqrt(foot) / reach_m[first]
+        here = _over_round(points, normals, index, height, mine, x, y, z, normal_here)
+        share = min(rest / total / np.float32(_ACROSS), np.float32(1))
+        across = here
+        if rest > 0:
+            across = _over_round(points, normals, index, height, others, x, y, z, normal_across)
+        # At an edge or a thin wall a place is in front of one side, in a corner of both.
+        both = max(here, across) if rise < 0 else min(here, across)
+        distance[i] = here + share * (both - here)
+        if len(normal):
+            beyond = share > 0 and abs(across) < abs(here)
+            normal[i] = normal_across if beyond else normal_here
+            if not far[i] < 1:
+                normal[i] = np.nan
 
 
+@compiled
 def _over_round(
-    weight: Float32, normals: Float32, offset: Float32, height: Float32
-) -> tuple[Float32, Float32]:
+    points: Float32,
+    normals: Float32,
+    index: Int32,
+    height: Float32,
+    weight: Float32,
+    x: np.float32,
+    y: np.float32,
+    z: np.float32,
+    mean: Float32,
+) -> np.float32:
     """Mean height over planes, along the middle between each plane's normal and their mean.
 
-    Planes that touch a sphere lie outside it; so taken, heights over them are those over it.
+    Planes that touch a sphere lie outside it; so taken, heights over them are those over it. The
+    mean normal is written to ``mean``.
     """
-    mean = np.einsum("ik,ikj->ij", weight, normals)
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-6)
-    middle = (height + np.einsum("ij,ikj->ik", mean, offset)) / 2
-    total = np.maximum(weight.sum(axis=1), 1e-9)
-    return np.asarray((weight * middle).sum(axis=1) / total, np.float32), mean
+    total = mx = my = mz = np.float32(0)
+    for k, j in enumerate(index):
+        w = weight[k]
+        total += w
+        mx, my, mz = mx + w * normals[j, 0], my + w * normals[j, 1], mz + w * normals[j, 2]
+    length = max(np.sqrt(mx * mx + my * my + mz * mz), np.float32(1e-9))
+    mx, my, mz = mx / length, my / length, mz / length
+    mean[0], mean[1], mean[2] = mx, my, mz
+    over = np.float32(0)
+    for k, j in enumerate(index):
+        offset = mx * (x - points[j, 0]) + my * (y - points[j, 1]) + mz * (z - points[j, 2])
+        over += weight[k] * (height[k] + offset)
+    return over / (2 * max(total, np.float32(1e-9)))

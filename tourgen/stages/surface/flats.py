@@ -18,13 +18,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import breadth_first_order
-from scipy.spatial import cKDTree
 
+from tourgen.compiled import compiled
 from tourgen.geometry import Float32, Float64
+from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import components
 from tourgen.stages.surface.tangent_planes import TangentPlanes
+from tourgen.symmetric import axes_of
 
 _SURFEL = 2.5
 """Edge of the voxels whose tangent planes are averaged, in spacings."""
@@ -172,14 +172,11 @@ def _grown(surfels: _Surfels, noise_m: float) -> Flats:
 def _neighbours(surfels: _Surfels, off_m: float) -> tuple[Ints, Ints, Float64]:
     """Pairs of surfels that may be of one plane, sorted, and how much those of each differ."""
     points, normals = surfels.points, surfels.normals
-    distance, near = cKDTree(points).query(
-        points,
-        k=range(2, _NEIGHBOURS + 2),
-        distance_upper_bound=_REACH * surfels.edge_m,
-        workers=-1,
-    )
+    count = _NEIGHBOURS + 1
+    near, _ = Neighbours.of(points, count).nearest(points, count, _REACH * surfels.edge_m)
     first = np.repeat(np.arange(len(points)), _NEIGHBOURS)
-    second, there = near.ravel(), np.isfinite(distance).ravel()
+    second = near[:, 1:].ravel().astype(np.int64)
+    there = second >= 0
     first, second = first[there], second[there]
     turn = np.einsum("ij,ij->i", normals[first], normals[second])
     between = points[second] - points[first]
@@ -216,16 +213,33 @@ class _Region:
         self, calm: Float64, edge_m: float, noise_m: float
     ) -> Iterator[tuple[Ints, Float64, float]]:
         """The surfels, normal and offset of each plane, from the calmest surfel on."""
-        free = np.ones(len(calm), bool)
+        count = len(calm)
+        free = np.ones(count, bool)
         untried = np.isfinite(calm)
-        starts = np.searchsorted(self.first, np.arange(len(calm) + 1))
+        starts = np.searchsorted(self.first, np.arange(count + 1))
+        queue, mark = np.empty(count, np.int64), np.zeros(count, np.int64)
+        rounds = 0
         for seed in np.argsort(calm, kind="stable"):
             if not (untried[seed] and free[seed]):
                 continue
             near = self.second[starts[seed] : starts[seed + 1]]
             members = np.append(near[free[near]], seed)
             for _ in range(_ROUNDS):
-                members = self._on(*self._fitted(members), seed, free, _OFF * noise_m)
+                rounds += 1
+                found = _hanging(
+                    self.points,
+                    self.normals,
+                    starts,
+                    self.second,
+                    *self._fitted(members),
+                    seed,
+                    free,
+                    _OFF * noise_m,
+                    rounds,
+                    queue,
+                    mark,
+                )
+                members = queue[:found].copy()
                 if len(members) < _LEAST_SURFELS:
                     break
             untried[members] = untried[seed] = False
@@ -239,26 +253,71 @@ class _Region:
 
     def _fitted(self, members: Ints) -> tuple[Float64, float]:
         """Unit normal and offset of the plane of some surfels, by least squares."""
-        middle = self.points[members].mean(axis=0)
-        mean = self.normals[members].mean(axis=0)
-        normal = mean / np.linalg.norm(mean)
-        if len(members) >= _LEAST_SURFELS:
-            apart = self.points[members] - middle
-            least = np.linalg.eigh(apart.T @ apart)[1][:, 0]
-            normal = least if least @ mean > 0 else -least
-        return normal, float(middle @ normal)
+        normal = np.empty(3)
+        offset = _plane(self.points, self.normals, members, normal)
+        return normal, offset
 
-    def _on(self, normal: Float64, offset: float, seed: int, free: Mask, off_m: float) -> Ints:
-        """The free surfels on a plane that hang together with the seed."""
-        on = free & (np.abs(self.points @ normal - offset) < off_m)
-        on &= self.normals @ normal > _ALIKE
-        if not on[seed]:
-            return np.asarray([seed])
-        both = on[self.first] & on[self.second]
-        size = len(on)
-        ends = self.first[both], self.second[both]
-        graph = csr_array((np.ones(len(ends[0]), np.int8), ends), (size, size))
-        return np.asarray(breadth_first_order(graph, seed, return_predecessors=False), np.int64)
+
+@compiled
+def _plane(points: Float64, normals: Float64, members: Ints, normal: Float64) -> float:
+    """Write the unit normal of some surfels' plane; its offset along it."""
+    count = len(members)
+    middle, mean = np.zeros(3), np.zeros(3)
+    for i in members:
+        middle += points[i]
+        mean += normals[i]
+    middle /= count
+    normal[:] = mean / np.sqrt((mean * mean).sum())
+    if count >= _LEAST_SURFELS:
+        xx = xy = xz = yy = yz = zz = 0.0
+        for i in members:
+            x, y, z = points[i, 0] - middle[0], points[i, 1] - middle[1], points[i, 2] - middle[2]
+            xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
+            yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
+        size, axes = np.empty(3), np.empty((3, 3))
+        axes_of(xx, xy, xz, yy, yz, zz, size, axes)
+        normal[:] = axes[0] if (axes[0] * mean).sum() > 0 else -axes[0]
+    return float(middle[0] * normal[0] + middle[1] * normal[1] + middle[2] * normal[2])
+
+
+@compiled
+def _hanging(
+    points: Float64,
+    normals: Float64,
+    starts: Ints,
+    second: Ints,
+    normal: Float64,
+    offset: float,
+    seed: int,
+    free: Mask,
+    off_m: float,
+    rounds: int,
+    queue: Ints,
+    mark: Ints,
+) -> int:
+    """Write to ``queue`` the free surfels on a plane that hang together with the seed; how many."""
+    found, done = 1, 0
+    queue[0], mark[seed] = seed, rounds
+    if not _on(points[seed], normals[seed], normal, offset, off_m):
+        return found
+    while done < found:
+        i = queue[done]
+        done += 1
+        for j in second[starts[i] : starts[i + 1]]:
+            if free[j] and mark[j] != rounds:
+                mark[j] = rounds
+                if _on(points[j], normals[j], normal, offset, off_m):
+                    queue[found] = j
+                    found += 1
+    return found
+
+
+@compiled
+def _on(point: Float64, own: Float64, normal: Float64, offset: float, off_m: float) -> bool:
+    """Whether a surfel lies on a plane and looks its way."""
+    height = point[0] * normal[0] + point[1] * normal[1] + point[2] * normal[2] - offset
+    alike = own[0] * normal[0] + own[1] * normal[1] + own[2] * normal[2]
+    return bool(abs(height) < off_m and alike > _ALIKE)
 
 
 def _bends(points: Float64, normal: Float64, offset: float, most_m: float) -> bool:
@@ -313,12 +372,8 @@ def _moved(planes: TangentPlanes, surfels: _Surfels, flats: Flats) -> tuple[Tang
     lain = np.flatnonzero(flats.of >= 0)
     if not len(lain):
         return planes, replace(flats, of=np.full(len(planes.points), -1))
-    _, near = cKDTree(surfels.points[lain]).query(
-        planes.points,
-        k=range(1, _AROUND + 1),
-        distance_upper_bound=1.5 * surfels.edge_m,
-        workers=-1,
-    )
+    around = Neighbours.of(surfels.points[lain], _AROUND)
+    near, _ = around.nearest(planes.points, _AROUND, 1.5 * surfels.edge_m)
     chosen, height = _nearest(planes, flats, np.append(flats.of[lain], -1)[near])
     on = np.flatnonzero(chosen >= 0)
     points, normals, support = planes.points.copy(), planes.normals.copy(), planes.support.copy()

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import binary_closing
-from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64
+from tourgen.neighbours import Neighbours
 from tourgen.stages.cells import cells_of
 from tourgen.stages.surface.flats import Flats
 from tourgen.stages.surface.tangent_planes import TangentPlanes
@@ -91,21 +91,16 @@ def _pairs(points: Float32, flats: Flats, spacing_m: float) -> Iterator[tuple[in
         return
     cells = cells_of(points, np.where(flats.of < 0, none, flats.of), none + 1, _CELL * spacing_m)
     middle = cells.means(points)
-    distance, found = cKDTree(middle).query(
-        middle,
-        k=np.arange(1, _NEIGHBOURS + 1),
-        distance_upper_bound=(_REACH + _CELL) * spacing_m,
-        workers=-1,
-    )
-    near = np.asarray(found)
-    one, rank = np.nonzero(np.isfinite(distance))
+    most_m = (_REACH + _CELL) * spacing_m
+    near, _ = Neighbours.of(middle, _NEIGHBOURS).nearest(middle, _NEIGHBOURS, most_m)
+    one, rank = np.nonzero(near >= 0)
     pair = _creased(cells.owner[one], cells.owner[near[one, rank]], flats)
     one, pair = one[pair >= 0], pair[pair >= 0]
     order = np.argsort(pair, kind="stable")
     for chosen in np.split(order, np.flatnonzero(np.diff(pair[order])) + 1):
         if len(chosen):
             around = near[np.unique(one[chosen])]
-            groups = np.unique(around[around < len(middle)])
+            groups = np.unique(around[around >= 0]).astype(np.int64)
             first, second = divmod(int(pair[chosen[0]]), none)
             yield first, second, cells.members(groups)
 

@@ -23,12 +23,16 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
-from tourgen.geometry import Float32, OrientedCloud, PointCloud
+from tourgen.compiled import compiled
+from tourgen.geometry import Float32, Int32, OrientedCloud, PointCloud
+from tourgen.neighbours import Neighbours
 from tourgen.stages import tangent
 from tourgen.stages.surface.tangent_planes import Smoothing, TangentPlanes, tangent_planes
+from tourgen.symmetric import axes_of
+from tourgen.threads import in_parts
 
+_PART = 1 << 14
 _COMPRESSED = np.float32(8.0)
 _NEIGHBOURS = 32
 """Points whose normals tell the direction in which the surface runs on."""
@@ -96,13 +100,30 @@ def along_profiles(
 def _directions(points: Float32, normals: Float32) -> tuple[Float32, npt.NDArray[np.bool_]]:
     """(n, 3) direction in which the surface runs on around each point; (n,) whether it does."""
     count = min(_NEIGHBOURS, len(points))
-    near = np.asarray(cKDTree(points).query(points, k=np.arange(1, count + 1), workers=-1)[1])
-    spread = np.zeros((len(points), 3, 3), np.float32)
-    for column in near.T:
-        theirs = normals[column]
-        spread += theirs[:, :, None] * theirs[:, None, :]
-    square, axes = np.linalg.eigh(spread / count)
-    return axes[:, :, 0], (square[:, 0] < _STEADY) & (square[:, 1] > _BENT)
+    near = Neighbours.of(points, count).nearest(points, count)[0]
+    ways, runs_on = np.empty_like(points), np.empty(len(points), np.bool_)
+
+    def find(first: int, last: int) -> None:
+        _runs_on(normals, near[first:last], ways[first:last], runs_on[first:last])
+
+    in_parts(find, len(points), _PART)
+    return ways, runs_on
+
+
+@compiled
+def _runs_on(normals: Float32, near: Int32, ways: Float32, runs_on: npt.NDArray[np.bool_]) -> None:
+    """Write the direction across which the normals of each neighbourhood spread."""
+    size, axes = np.empty(3), np.empty((3, 3))
+    count = near.shape[1]
+    for i in range(len(near)):
+        xx = xy = xz = yy = yz = zz = 0.0
+        for j in near[i]:
+            x, y, z = normals[j, 0], normals[j, 1], normals[j, 2]
+            xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
+            yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
+        axes_of(xx / count, xy / count, xz / count, yy / count, yz / count, zz / count, size, axes)
+        ways[i] = axes[0]
+        runs_on[i] = size[0] < _STEADY and size[1] > _BENT
 
 
 def _peaks(directions: Float32) -> list[Float32]:

@@ -25,11 +25,14 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.spatial import cKDTree
 
-from tourgen.geometry import Float32, Float64
+from tourgen.compiled import compiled
+from tourgen.geometry import Float32, Float64, Int32
+from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import components
 from tourgen.stages.surface.bent_rods import bent, traced
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.stages.surface.tubes import ON, RADII_M, WIDTH_TRUST, Rod, behind, fits
+from tourgen.symmetric import axes_of
 
 _REACH = 4.0
 """How far around a point its direction is taken from, in spacings."""
@@ -122,30 +125,74 @@ def _sticks(points: Float32, spacing_m: float) -> Iterator[Ints]:
     """Points that run on in one direction, (k,) each."""
     if len(points) <= _LEAST:
         return
-    rank = np.arange(2, _NEIGHBOURS + 2)
-    distance, near = cKDTree(points).query(
-        points, k=rank, distance_upper_bound=_REACH * spacing_m, workers=-1
-    )
-    there = np.isfinite(distance)
-    offset = points[np.where(there, near, 0)] - points[:, None]
-    offset[~there] = 0
-    count = there.sum(axis=1)
-    apart = offset - (offset.sum(axis=1) / np.maximum(count, 1)[:, None])[:, None]
-    apart[~there] = 0
-    spread, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", apart, apart))
-    spread = np.sqrt(np.maximum(spread, 0))
-    thin = (count >= _LEAST) & (spread[:, 1] < _THIN * spread[:, 2])
-    along = axes[:, :, 2].astype(np.float32)
-    first = np.repeat(np.arange(len(points)), there.shape[1])[there.ravel()]
-    second = np.asarray(near)[there]
-    aside = np.linalg.norm(np.cross(offset[there], along[first]), axis=1)
-    alike = np.abs(np.einsum("ij,ij->i", along[first], along[second])) > _ALONG
-    joined = alike & (aside < _ASIDE_M) & thin[first] & thin[second]
-    stick = components(np.stack([first[joined], second[joined]], axis=1), len(points))
+    count = min(_NEIGHBOURS + 1, len(points))
+    near = Neighbours.of(points, count).nearest(points, count, _REACH * spacing_m)[0][:, 1:]
+    along, thin = _ways(points, near)
+    stick = components(_joined(points, near, along, thin), len(points))
     order = np.argsort(stick, kind="stable")
     for own in np.split(order, np.flatnonzero(np.diff(stick[order])) + 1):
         if len(own) >= _POINTS:
             yield own
+
+
+@compiled
+def _ways(points: Float32, near: Int32) -> tuple[Float32, Mask]:
+    """(n, 3) the way in which the points around each are spread, and (n,) whether in it alone."""
+    along, thin = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.bool_)
+    size, axes = np.empty(3), np.empty((3, 3))
+    for i in range(len(points)):
+        x = y = z = xx = xy = xz = yy = yz = zz = 0.0
+        count = 0
+        for j in near[i]:
+            if j < 0:
+                break
+            a, b, c = (
+                points[j, 0] - points[i, 0],
+                points[j, 1] - points[i, 1],
+                points[j, 2] - points[i, 2],
+            )
+            x, y, z = x + a, y + b, z + c
+            xx, xy, xz = xx + a * a, xy + a * b, xz + a * c
+            yy, yz, zz = yy + b * b, yz + b * c, zz + c * c
+            count += 1
+        if count < _LEAST:
+            continue
+        axes_of(
+            xx - x * x / count,
+            xy - x * y / count,
+            xz - x * z / count,
+            yy - y * y / count,
+            yz - y * z / count,
+            zz - z * z / count,
+            size,
+            axes,
+        )
+        along[i] = axes[2]
+        thin[i] = max(size[1], 0.0) < _THIN**2 * size[2]
+    return along, thin
+
+
+@compiled
+def _joined(points: Float32, near: Int32, along: Float32, thin: Mask) -> Ints:
+    """(p, 2) neighbours that run on in each other's direction."""
+    pairs = np.empty((near.size, 2), np.int64)
+    found = 0
+    for i in np.flatnonzero(thin):
+        for j in near[i]:
+            if j < 0 or not thin[j]:
+                continue
+            x, y, z = (
+                points[j, 0] - points[i, 0],
+                points[j, 1] - points[i, 1],
+                points[j, 2] - points[i, 2],
+            )
+            a, b, c = along[i, 0], along[i, 1], along[i, 2]
+            aside = (y * c - z * b) ** 2 + (z * a - x * c) ** 2 + (x * b - y * a) ** 2
+            alike = abs(a * along[j, 0] + b * along[j, 1] + c * along[j, 2])
+            if aside < _ASIDE_M**2 and alike > _ALONG:
+                pairs[found, 0], pairs[found, 1] = i, j
+                found += 1
+    return pairs[:found]
 
 
 def _fitted(points: Float32, normals: Float32, noise_m: float, spacing_m: float) -> Rod | None:

@@ -17,16 +17,17 @@ across an edge, is told by its ``support``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
+from tourgen.compiled import compiled
 from tourgen.geometry import Float32, Int32, OrientedCloud
+from tourgen.neighbours import Neighbours
+from tourgen.threads import in_parts
 
-_CHUNK = 1 << 16
+_PART = 1 << 14
 _NORMAL_PASSES = 2
 _POINT_PASSES = 2
 _NOISE_SAMPLE = 20_000
@@ -89,8 +90,8 @@ def noise_of(oriented: OrientedCloud) -> float:
     """
     points, normals = oriented.cloud.points, oriented.normals
     chosen = np.random.default_rng(0).permutation(len(points))[:_NOISE_SAMPLE]
-    rank = np.arange(2, min(_NOISE_NEIGHBOURS + 1, len(points)) + 1)
-    near = np.asarray(cKDTree(points).query(points[chosen], k=rank, workers=-1)[1])
+    count = min(_NOISE_NEIGHBOURS + 1, len(points))
+    near = Neighbours.of(points, count).nearest(points[chosen], count)[0][:, 1:]
     if not near.size:
         return 0.0
     normal = normals[chosen, None] + normals[near]
@@ -111,60 +112,107 @@ def tangent_planes(oriented: OrientedCloud, settings: Smoothing) -> TangentPlane
     """
     points, normals = oriented.cloud.points, oriented.normals
     count = min(settings.neighbours + 1, len(points))
-    rank = np.arange(2, count + 1)
-    distance, index = cKDTree(points).query(points, k=rank, workers=-1)
-    fourth = np.asarray(distance, np.float32)[:, min(3, count - 2)]
+    index, distance = Neighbours.of(points, count).nearest(points, count)
+    near, fourth = index[:, 1:], distance[:, min(4, count - 1)]
     spacing_m = fourth * np.float32(np.sqrt(np.pi / 4))
-    near = np.asarray(index, np.int32)
-    del distance, index, fourth
+    same = np.float32(1 - np.cos(np.radians(settings.crease_deg)))
     for _ in range(_NORMAL_PASSES):
-        normals = _smoothed(points, normals, near, settings)
+        normals = _smoothed(points, normals, near, same)
     support = np.empty(0, np.float32)
     for _ in range(_POINT_PASSES):
-        points, support = _moved(points, normals, near, settings)
+        points, support = _moved(points, normals, near, same, np.float32(3 * settings.noise_m))
     return TangentPlanes(points, normals, spacing_m, support, settings.noise_m)
 
 
-def _smoothed(points: Float32, normals: Float32, near: Int32, settings: Smoothing) -> Float32:
-    new = normals.copy()
-    for part, around in _parts(near):
-        weight = _closeness(points, part, around) * _likeness(normals, part, around, settings)
-        new[part] += np.einsum("ik,ikj->ij", weight, normals[around])
-    return np.asarray(new / np.linalg.norm(new, axis=1, keepdims=True), np.float32)
+def _smoothed(points: Float32, normals: Float32, near: Int32, same: np.float32) -> Float32:
+    new = np.empty_like(normals)
+
+    def smooth(first: int, last: int) -> None:
+        _smooth(points, normals, near, first, last, same, new)
+
+    in_parts(smooth, len(points), _PART)
+    return new
 
 
 def _moved(
-    points: Float32, normals: Float32, near: Int32, settings: Smoothing
+    points: Float32, normals: Float32, near: Int32, same: np.float32, off_m: np.float32
 ) -> tuple[Float32, Float32]:
     new, support = np.empty_like(points), np.empty(len(points), np.float32)
-    for part, around in _parts(near):
-        between = (normals[around] + normals[part, None]) / 2
-        off = np.einsum("ikj,ikj->ik", points[part, None] - points[around], between)
-        closeness = _closeness(points, part, around)
-        weight = closeness * _likeness(normals, part, around, settings)
-        weight *= np.exp(-np.square(off / np.float32(3 * settings.noise_m)))
-        shift = (weight * off).sum(axis=1) / (1 + weight.sum(axis=1))
-        new[part] = points[part] - shift[:, None] * normals[part]
-        support[part] = weight.sum(axis=1) / closeness.sum(axis=1)
+
+    def move(first: int, last: int) -> None:
+        _move(points, normals, near, first, last, same, off_m, new, support)
+
+    in_parts(move, len(points), _PART)
     return new, support
 
 
-def _parts(near: Int32) -> Iterator[tuple[slice, Int32]]:
-    for start in range(0, len(near), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        yield part, near[part]
+@compiled
+def _smooth(
+    points: Float32,
+    normals: Float32,
+    near: Int32,
+    first: int,
+    last: int,
+    same: np.float32,
+    new: Float32,
+) -> None:
+    """Write the mean normals of some points."""
+    weight = np.empty(near.shape[1], np.float32)
+    for i in range(first, last):
+        _closeness(points, i, near[i], weight)
+        x, y, z = normals[i, 0], normals[i, 1], normals[i, 2]
+        mx, my, mz = x, y, z
+        for k, j in enumerate(near[i]):
+            a, b, c = normals[j, 0], normals[j, 1], normals[j, 2]
+            w = weight[k] * np.exp((x * a + y * b + z * c - 1) / same)
+            mx, my, mz = mx + w * a, my + w * b, mz + w * c
+        length = np.sqrt(mx * mx + my * my + mz * mz)
+        new[i, 0], new[i, 1], new[i, 2] = mx / length, my / length, mz / length
 
 
-def _closeness(points: Float32, part: slice, around: Int32) -> Float32:
-    """(n, k) weight of each neighbour by its distance, up to 1."""
-    offset = points[around] - points[part, None]
-    away = np.einsum("ikj,ikj->ik", offset, offset)
-    width = np.float32(_WIDTH**2) * away.max(axis=1, keepdims=True)
-    return np.asarray(np.exp(-away / width), np.float32)
+@compiled
+def _move(
+    points: Float32,
+    normals: Float32,
+    near: Int32,
+    first: int,
+    last: int,
+    same: np.float32,
+    off_m: np.float32,
+    new: Float32,
+    support: Float32,
+) -> None:
+    """Write where some points lie on their neighbours' planes, and how many of these agree."""
+    weight = np.empty(near.shape[1], np.float32)
+    for i in range(first, last):
+        _closeness(points, i, near[i], weight)
+        x, y, z = normals[i, 0], normals[i, 1], normals[i, 2]
+        close = total = shift = np.float32(0)
+        for k, j in enumerate(near[i]):
+            a, b, c = normals[j, 0], normals[j, 1], normals[j, 2]
+            off = (points[i, 0] - points[j, 0]) * (a + x)
+            off += (points[i, 1] - points[j, 1]) * (b + y)
+            off += (points[i, 2] - points[j, 2]) * (c + z)
+            off /= 2
+            alike = (x * a + y * b + z * c - 1) / same
+            w = weight[k] * np.exp(alike - (off / off_m) ** 2)
+            close, total, shift = close + weight[k], total + w, shift + w * off
+        shift /= 1 + total
+        new[i, 0], new[i, 1] = points[i, 0] - shift * x, points[i, 1] - shift * y
+        new[i, 2] = points[i, 2] - shift * z
+        support[i] = total / close
 
 
-def _likeness(normals: Float32, part: slice, around: Int32, settings: Smoothing) -> Float32:
-    """(n, k) weight of each neighbour by its normal, up to 1."""
-    alike = np.einsum("ij,ikj->ik", normals[part], normals[around])
-    same = np.float32(1 - np.cos(np.radians(settings.crease_deg)))
-    return np.asarray(np.exp((alike - 1) / same), np.float32)
+@compiled
+def _closeness(points: Float32, i: int, near: Int32, weight: Float32) -> None:
+    """Write the weight of each neighbour of a point by its distance, up to 1."""
+    most = np.float32(0)
+    for k, j in enumerate(near):
+        away = (points[j, 0] - points[i, 0]) ** 2
+        away += (points[j, 1] - points[i, 1]) ** 2
+        away += (points[j, 2] - points[i, 2]) ** 2
+        weight[k] = away
+        most = max(most, away)
+    width = np.float32(_WIDTH * _WIDTH) * most
+    for k in range(len(near)):
+        weight[k] = np.exp(-weight[k] / width)

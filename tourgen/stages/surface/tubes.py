@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from tourgen.compiled import compiled
 from tourgen.geometry import Float32, Float64, Mesh
 
 RADII_M = (0.005, 0.025)
@@ -70,28 +71,48 @@ class Rod:
 
         Both go on straight beyond the ends.
         """
-        last = len(self.axis) - 2
-        if last:
-            near = np.asarray(cKDTree(self.axis).query(points)[1], np.int64)
-            pieces = [np.clip(near - 1, 0, last), np.clip(near, 0, last)]
-        else:
-            pieces = [np.zeros(len(points), np.int64)]
-        at_m, ways = self._along_m, np.diff(self.axis, axis=0)
-        steps = np.linalg.norm(ways, axis=1)
-        ways = ways / steps[:, None]
-        best_m = np.full(len(points), np.inf)
-        along_m = np.zeros(len(points))
-        for piece in pieces:
-            apart = points - self.axis[piece]
-            reach = np.einsum("ij,ij->i", apart, ways[piece])
-            low = np.where(piece == 0, -np.inf, 0.0)
-            high = np.where(piece == last, np.inf, steps[piece])
-            reach = np.clip(reach, low, high)
-            off_m = np.linalg.norm(apart - reach[:, None] * ways[piece], axis=1)
-            nearer = off_m < best_m
-            best_m[nearer] = off_m[nearer]
-            along_m[nearer] = (at_m[piece] + reach)[nearer]
-        return along_m, best_m - self.radius_m
+        near = np.zeros(len(points), np.int64)
+        if len(self.axis) > 2:
+            near[:] = cKDTree(self.axis).query(points)[1]
+        along_m, off_m = np.empty((2, len(points)))
+        _lie(points, self.axis, self._along_m, near, along_m, off_m)
+        return along_m, off_m - self.radius_m
+
+
+@compiled
+def _lie(
+    points: Float32 | Float64,
+    axis: Float64,
+    at_m: Float64,
+    near: Ints,
+    along_m: Float64,
+    off_m: Float64,
+) -> None:
+    """Write where points lie along an axis, and how far off, by the pieces at their nearest places.
+
+    Args:
+        points: (n, 3) metres.
+        axis: (k, 3)
+        at_m: (k,) how far along each place of the axis lies.
+        near: (n,) the place nearest to each point.
+        along_m: (n,) is filled.
+        off_m: (n,) is filled.
+    """
+    last = len(axis) - 2
+    for i in range(len(points)):
+        off_m[i] = np.inf
+        for piece in range(max(near[i] - 1, 0), min(near[i], last) + 1):
+            length = at_m[piece + 1] - at_m[piece]
+            reach = square = 0.0
+            for k in range(3):
+                apart = points[i, k] - axis[piece, k]
+                square += apart * apart
+                reach += apart * (axis[piece + 1, k] - axis[piece, k]) / length
+            held = reach if piece == 0 else max(reach, 0.0)
+            held = held if piece == last else min(held, length)
+            off = np.sqrt(max(square - reach * reach, 0.0) + (reach - held) ** 2)
+            if off < off_m[i]:
+                off_m[i], along_m[i] = off, at_m[piece] + held
 
 
 def fits(radius_m: float, off_m: Float64, noise_m: float) -> bool:
