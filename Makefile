@@ -15,6 +15,7 @@ help:
 	@echo "make lint        ruff, mypy and the viewer's types"
 	@echo "make bench       accuracy of the demo against its ground truth"
 	@echo "make bench-fidelity   every method and its peers against it (BENCH='--room chamber1')"
+	@echo "make soak        a build killed at 30 moments, which takes half an hour"
 	@echo "make pictures    screenshots of the demo for README and docs"
 	@echo "make lock        pin the newest versions, with their hashes"
 	@echo "make clean       drop all that make made"
@@ -100,6 +101,10 @@ lint: install
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	cd static && $(NPM) run check
+
+.PHONY: soak
+soak: install system-tests tests/node_modules/.package-lock.json
+	$(BIN)/pytest tests/commands/test_kills.py --kills 30
 
 .PHONY: bench
 bench: demo

@@ -17,6 +17,7 @@ from tourgen.cli import main
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--tour", type=Path, help="judge this built tour, not a miniature of the demo")
+    parser.addoption("--kills", type=int, default=2, help="builds that are killed (make soak: 30)")
 
 
 @pytest.fixture(scope="session")

@@ -71,6 +71,15 @@ class Surface:
     picture: Image.Image
 
 
+def published_files(site: Path) -> dict[str, bytes]:
+    """Every file of a site but the report, which tells how long things took."""
+    return {
+        str(file.relative_to(site)): file.read_bytes()
+        for file in site.rglob("*")
+        if file.is_file() and file.stem != "report"
+    }
+
+
 def rooms_of(site: Path) -> dict[str, dict[str, Any]]:
     """The rooms of tour.json by id."""
     tour = json.loads((site / "tour.json").read_text(encoding="utf-8"))

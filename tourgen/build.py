@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,14 @@ import numpy as np
 from tourgen.cache import Cache
 from tourgen.errors import Faults, InputError, TourgenError
 from tourgen.geometry import View
-from tourgen.pipeline import RoomRecipe, RoomResult, planned, tour_recipes
+from tourgen.pipeline import RoomRecipe, RoomResult, build_rooms, planned, tour_recipes
+from tourgen.profile import require_profiler, write_flame_graph
 from tourgen.progress import Listener
 from tourgen.report import tour_report
 from tourgen.site import BuiltRoom, write_site
 from tourgen.threads import cores
 from tourgen.tour import Link, Tour, Viewpoint
-from tourgen.workers import build_rooms
+from tourgen.workers import Workers, workers
 
 _STEP_INSIDE_M = 0.9
 
@@ -56,7 +58,14 @@ def plan_tour(tour: Tour) -> tuple[Planned, ...]:
 
 
 def build_tour(
-    tour: Tour, out: Path, listener: Listener, *, only: Sequence[str] = (), jobs: int | None = None
+    tour: Tour,
+    out: Path,
+    listener: Listener,
+    *,
+    only: Sequence[str] = (),
+    jobs: int | None = None,
+    cluster: str | None = None,
+    profile: Path | None = None,
 ) -> dict[str, Any]:
     """Build a tour's site.
 
@@ -65,7 +74,9 @@ def build_tour(
         out: The site's folder, swapped in whole.
         listener: Told each stage that starts.
         only: Ids of the rooms to build; the others must have been built before. Empty: all.
-        jobs: Rooms built at once; as many as there are cores if left out.
+        jobs: Tasks that run at once; as many as there are cores if left out.
+        cluster: Address of a dask scheduler, whose workers run them instead.
+        profile: Page that a flame graph of what ran is written to.
 
     Returns:
         The report.
@@ -78,8 +89,12 @@ def build_tour(
     cache = Cache(tour.folder)
     recipes = tour_recipes(tour, cache)
     _require_built(recipes, [tour.room(room_id).id for room_id in only], cache)
-    at_work = sum(bool(planned(recipe, cache)) for recipe in recipes)
-    outcomes = build_rooms(recipes, cache, max(1, min(jobs or cores(), at_work)), listener)
+    at_work = any(planned(recipe, cache) for recipe in recipes)
+    with workers((jobs or cores()) if at_work else 1, cluster if at_work else None) as here:
+        if profile:
+            outcomes = _profiled(recipes, cache, here, listener, profile)
+        else:
+            outcomes = build_rooms(recipes, cache, here, listener)
     rooms = [outcome for outcome in outcomes if isinstance(outcome, RoomResult)]
     if len(rooms) < len(outcomes):
         raise RoomsFailed(tuple(each for each in outcomes if isinstance(each, TourgenError)))
@@ -87,6 +102,19 @@ def build_tour(
     write_site(tour, _published(tour, {room.id: room for room in rooms}), report, out)
     cache.prune(frozenset(key for recipe in recipes for key in recipe.keys))
     return report
+
+
+def _profiled(
+    recipes: Sequence[RoomRecipe], cache: Cache, here: Workers, listener: Listener, page: Path
+) -> list[RoomResult | TourgenError]:
+    """Build rooms, and write where the time goes."""
+    require_profiler()
+    with TemporaryDirectory(dir=cache.tour_folder, prefix=".profile-") as folder:
+        outcomes = build_rooms(recipes, cache, here, listener, Path(folder))
+        files = sorted(Path(folder).iterdir())
+        if files:
+            write_flame_graph(files, page)
+    return outcomes
 
 
 def _require_built(recipes: Iterable[RoomRecipe], only: Sequence[str], cache: Cache) -> None:

@@ -3,13 +3,15 @@
 A key is the digest of its *ingredients*: the stage's name and version, the versions of the
 libraries it calls, its settings, and the keys of what it was fed. Thread counts, paths and log
 levels never enter. Entries are written aside and renamed, and carry a digest of their own: an
-entry cut short or flipped counts as absent.
+entry cut short or flipped counts as absent. Arrays lie in a file of their own, which is mapped into
+memory: of a large result only what is looked at is read, and processes share it.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import mmap
 import os
 import pickle
 import shutil
@@ -25,6 +27,9 @@ Ingredients = Mapping[str, Any]
 
 _FOLDER = ".tourgen"
 _LIMIT_BYTES = 40 * 2**30
+_RESULT, _ARRAYS = "result.pickle", "arrays.bin"
+_ALIGNED = 64
+"""Arrays begin at multiples of so many bytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +66,7 @@ class Cache:
     """The results of one tour, in ``DIR/.tourgen``."""
 
     def __init__(self, tour_folder: Path) -> None:
+        self.tour_folder = tour_folder
         self._root = tour_folder / _FOLDER
         self._results = self._root / "results"
 
@@ -81,23 +87,27 @@ class Cache:
         folder = self._results / key
         try:
             about = json.loads((folder / "about.json").read_text())
-            data = (folder / "result.pickle").read_bytes()
-        except (OSError, ValueError):
+            if _digest(folder) != about["sha256"]:
+                shutil.rmtree(folder, ignore_errors=True)
+                return None
+            data = (folder / _RESULT).read_bytes()
+            arrays = _mapped(folder / _ARRAYS, about["arrays"])
+            os.utime(folder)
+        except (OSError, ValueError, KeyError):
             return None
-        if hashlib.sha256(data).hexdigest() != about["sha256"]:
-            shutil.rmtree(folder, ignore_errors=True)
-            return None
-        os.utime(folder)
-        return pickle.loads(data)
+        return pickle.loads(data, buffers=arrays)
 
     def store(self, key: str, result: Any, cost: Cost) -> None:
         """Keep a result; a second store of one key changes nothing."""
         self._results.mkdir(parents=True, exist_ok=True)
         aside = Path(tempfile.mkdtemp(prefix="aside-", dir=self._results))
-        data = pickle.dumps(result, protocol=5)
-        (aside / "result.pickle").write_bytes(data)
+        arrays: list[pickle.PickleBuffer] = []
+        (aside / _RESULT).write_bytes(
+            pickle.dumps(result, protocol=5, buffer_callback=arrays.append)
+        )
         about = {
-            "sha256": hashlib.sha256(data).hexdigest(),
+            "arrays": _written(arrays, aside / _ARRAYS),
+            "sha256": _digest(aside),
             "cost": {"seconds": cost.seconds, "peak_rss_mb": cost.peak_rss_mb},
         }
         (aside / "about.json").write_text(json.dumps(about))
@@ -167,3 +177,36 @@ class Cache:
         aside = target.with_suffix(f".{os.getpid()}.aside")
         aside.write_text(json.dumps(content))
         aside.replace(target)
+
+
+def _written(arrays: list[pickle.PickleBuffer], file: Path) -> list[int]:
+    """Write arrays one after the other; how many bytes each has."""
+    sizes = []
+    with file.open("wb") as stream:
+        for array in arrays:
+            size = stream.write(array.raw())
+            stream.write(bytes(-size % _ALIGNED))
+            sizes.append(size)
+    return sizes
+
+
+def _mapped(file: Path, sizes: list[int]) -> list[memoryview]:
+    """The arrays of a file; what is written to them stays in this process."""
+    if not sum(sizes):
+        return [memoryview(bytearray()) for _ in sizes]
+    with file.open("rb") as stream:
+        mapped = memoryview(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_COPY))
+    found, start = [], 0
+    for size in sizes:
+        found.append(mapped[start : start + size])
+        start += size + -size % _ALIGNED
+    return found
+
+
+def _digest(folder: Path) -> str:
+    """Of an entry's files."""
+    digest = hashlib.sha256()
+    for name in (_RESULT, _ARRAYS):
+        with (folder / name).open("rb") as stream:
+            digest.update(hashlib.file_digest(stream, "sha256").digest())
+    return digest.hexdigest()

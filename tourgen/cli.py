@@ -11,6 +11,7 @@ from typing import Any
 
 from tourgen import __version__
 from tourgen.errors import Faults, InputError, TourgenError
+from tourgen.threads import limit_native_threads
 
 OUTPUT = "site"
 
@@ -75,7 +76,16 @@ def _parser() -> argparse.ArgumentParser:
         "--room", action="append", default=[], metavar="ID", help="build only this room; repeatable"
     )
     build.add_argument(
-        "--jobs", type=_positive, metavar="N", help="rooms built at once (one a core)"
+        "--jobs", type=_positive, metavar="N", help="stages that run at once (one a core)"
+    )
+    build.add_argument(
+        "--cluster", metavar="ADDRESS", help="run them on the workers of this dask scheduler"
+    )
+    build.add_argument(
+        "--profile",
+        type=Path,
+        metavar="PAGE",
+        help="write where the time of what runs goes, a flame graph in HTML",
     )
     serve.add_argument("--port", type=_positive, default=8000, help="port (8000)")
     for command in (check, plan, build, doctor):
@@ -147,6 +157,7 @@ def _plan(asked: argparse.Namespace) -> int:
 
 
 def _build(asked: argparse.Namespace) -> int:
+    limit_native_threads()  # before anything loads such libraries
     from tourgen.build import build_tour
     from tourgen.progress import ProgressBars
     from tourgen.tour import check_tour
@@ -154,7 +165,15 @@ def _build(asked: argparse.Namespace) -> int:
     tour, _ = check_tour(asked.folder)
     out = asked.output or asked.folder / OUTPUT
     with ProgressBars() as bars:
-        report = build_tour(tour, out, bars, only=asked.room, jobs=asked.jobs)
+        report = build_tour(
+            tour,
+            out,
+            bars,
+            only=asked.room,
+            jobs=asked.jobs,
+            cluster=asked.cluster,
+            profile=asked.profile,
+        )
     if asked.json:
         _print_json(report)
         return 0

@@ -1,21 +1,24 @@
 """The recipe: which stage follows which, from a room's scans to its published files.
 
 ``room_recipe`` names every stage of a room with its inputs and settings, and thereby its key, and
-runs nothing; ``build_room`` runs what is missing.
+runs nothing; ``build_rooms`` runs what is missing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tourgen.cache import Cache, Cost
+from tourgen.errors import TourgenError
+from tourgen.expected import stage_of
 from tourgen.fitting import picture, points, surface
 from tourgen.geometry import View
 from tourgen.progress import Listener, Started
+from tourgen.scheduler import RoomTasks, run_missing
 from tourgen.stages import (
     bake,
     entry,
@@ -38,8 +41,9 @@ from tourgen.stages import (
     trim,
     unwrap,
 )
-from tourgen.tasks import Runner, Task, in_order, missing_tasks, task, why
+from tourgen.tasks import Task, in_order, missing_tasks, task, why
 from tourgen.tour import Room, Tour
+from tourgen.workers import Workers
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,49 +220,88 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         version=exposure.VERSION,
         libraries=("numba", "scipy"),
     )
-    unwrapped = task(
-        "unwrap",
-        picture.unwrapped,
+    sized = task(
+        "texels",
+        picture.sized,
         tree,
         lit,
         scanned,
         settings=picture.Texels(room.texture.texel_mm),
         version=unwrap.VERSION,
-        libraries=("numba", "xatlas", "scipy"),
+        libraries=("numba",),
     )
-    baked = task(
-        "bake",
-        picture.baked,
-        unwrapped,
+    unwrapped = tuple(
+        task(
+            f"unwrap{part}",
+            partial(picture.unwrapped, part),
+            tree,
+            sized,
+            version=unwrap.VERSION,
+            libraries=("numba", "scipy", "xatlas"),
+        )
+        for part in picture.PARTS
+    )
+    continued = task(
+        "floors",
+        picture.continued,
         oriented,
         lit,
-        scanned,
-        joined,
         simplified,
         settings=bake.Settings(),
         version=bake.VERSION,
-        libraries=("numba", "open3d", "scipy"),
+        libraries=("numba", "scipy"),
+    )
+    colors = task(
+        "colors",
+        picture.indexed,
+        lit,
+        continued,
+        oriented,
+        sized,
+        version=bake.VERSION,
+        libraries=("numba",),
+    )
+    overlooked = task(
+        "vistas",
+        picture.overlooked,
+        scanned,
+        joined,
+        simplified,
+        colors,
+        settings=bake.VistaSettings(),
+        version=bake.VERSION,
+        libraries=("open3d", "scipy"),
+    )
+    baked = tuple(
+        task(
+            f"bake{part}",
+            picture.baked,
+            uv_meshes,
+            colors,
+            overlooked,
+            settings=bake.Settings(),
+            version=bake.VERSION,
+            libraries=("numba", "open3d"),
+        )
+        for part, uv_meshes in zip(picture.PARTS, unwrapped, strict=True)
     )
     guessed = task(
         "inferred",
         picture.guessed,
-        unwrapped,
         sifted,
         joined,
         spaced,
+        unwrapped,
         settings=surface.Detail(detail_mm),
         version=inferred.VERSION,
-        libraries=(
-            "numba",
-            "scipy",
-        ),
+        libraries=("numba",),
     )
     files = task(
         "pack",
         picture.packed,
         tree,
-        baked,
         guessed,
+        baked,
         settings=picture.Packing(room.texture.quality),
         version=pack.VERSION,
         libraries=("DracoPy", "pygltflib", "pillow"),
@@ -276,8 +319,8 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         "poster",
         picture.pictured,
         tree,
-        baked,
         entered,
+        baked,
         settings=poster.Settings(),
         version=poster.VERSION,
         libraries=("open3d", "pillow"),
@@ -344,37 +387,71 @@ def tour_recipes(tour: Tour, cache: Cache) -> tuple[RoomRecipe, ...]:
 def planned(recipe: RoomRecipe, cache: Cache) -> tuple[tuple[str, str], ...]:
     """The stages of a room that a build would run, each with the reason."""
     before = cache.last_ingredients(recipe.room.id)
-    return tuple((each.name, why(each, before)) for each in missing_tasks(cache, recipe.goals))
+    reasons: dict[str, str] = {}
+    for each in missing_tasks(cache, recipe.goals):
+        reasons.setdefault(stage_of(each.name), why(each, before))
+    return tuple(reasons.items())
 
 
-def build_room(recipe: RoomRecipe, cache: Cache, listener: Listener) -> RoomResult:
-    """Run what is missing of a room's recipe.
+def build_rooms(
+    recipes: Sequence[RoomRecipe],
+    cache: Cache,
+    workers: Workers,
+    listener: Listener,
+    profiles: Path | None = None,
+) -> list[RoomResult | TourgenError]:
+    """Run what is missing of the rooms' recipes.
 
     Args:
-        recipe: The room's.
+        recipes: Of the rooms.
         cache: Of the tour.
+        workers: Where stages run.
         listener: Told each stage that starts.
+        profiles: Folder for what is sampled of each task, if it is to be.
+
+    Returns:
+        For each recipe the result, or why there is none.
     """
-    waiting = tuple(each.name for each in missing_tasks(cache, recipe.goals))
+    by_id = {recipe.room.id: recipe for recipe in recipes}
 
-    def announce(each: Task[Any]) -> None:
-        ahead = waiting[waiting.index(each.name) :] if each.name in waiting else (each.name,)
-        listener(Started(recipe.room.id, each.name, ahead, recipe.scan_mb))
+    def announce(room: str, stage: str, ahead: tuple[str, ...]) -> None:
+        listener(Started(room, stage, ahead, by_id[room].scan_mb))
 
-    runner = Runner(cache, recipe.goals, announce)
-    runner.run()
-    result = RoomResult(
-        recipe.room.id,
-        runner.result(recipe.files),
-        runner.result(recipe.poster),
-        runner.result(recipe.entry),
-        runner.result(recipe.quality),
-        runner.result(recipe.summary),
-        {each.name: cache.cost(each.key) or Cost(0, 0) for each in in_order(recipe.goals)},
-        tuple(runner.ran),
-    )
-    cache.remember_ingredients(
-        recipe.room.id, {each.name: each.ingredients for each in in_order(recipe.goals)}
-    )
-    listener(Started(recipe.room.id, "", (), recipe.scan_mb))
-    return result
+    wanted = {room: RoomTasks(each.goals, each.scan_mb) for room, each in by_id.items()}
+    ran: dict[str, set[str]] = {room: set() for room in by_id}
+    found: dict[str, RoomResult | TourgenError] = {}
+    while wanted:  # again only where an entry turns out to be broken
+        for room, outcome in run_missing(wanted, cache, workers, announce, profiles).items():
+            if isinstance(outcome, TourgenError):
+                found[room] = outcome
+                continue
+            ran[room] |= set(map(stage_of, outcome))
+            result = _result(by_id[room], cache, ran[room])
+            if result is not None:
+                found[room] = result
+        wanted = {room: each for room, each in wanted.items() if room not in found}
+    return [found[recipe.room.id] for recipe in recipes]
+
+
+def _result(recipe: RoomRecipe, cache: Cache, ran: set[str]) -> RoomResult | None:
+    """What the goals of a recipe came to; None where one is not whole in the cache."""
+    goals = [cache.load(each.key) for each in recipe.goals]
+    if any(each is None for each in goals):
+        return None
+    tasks = in_order(recipe.goals)
+    cache.remember_ingredients(recipe.room.id, {each.name: each.ingredients for each in tasks})
+    costs = _by_stage({each.name: cache.cost(each.key) or Cost(0, 0) for each in tasks})
+    files, picture_file, view, quality, summary = goals
+    in_turn = tuple(stage for stage in costs if stage in ran)
+    return RoomResult(recipe.room.id, files, picture_file, view, quality, summary, costs, in_turn)
+
+
+def _by_stage(costs: Mapping[str, Cost]) -> dict[str, Cost]:
+    """What stages cost: those that are split, all parts together."""
+    found: dict[str, Cost] = {}
+    for name, cost in costs.items():
+        before = found.get(stage_of(name), Cost(0, 0))
+        found[stage_of(name)] = Cost(
+            round(before.seconds + cost.seconds, 3), max(before.peak_rss_mb, cost.peak_rss_mb)
+        )
+    return found

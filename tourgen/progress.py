@@ -14,14 +14,7 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-#: Seconds a megabyte of scan, as the demo's rooms of 13 to 23 MB took on two cores; 0.02 for a
-#: stage not named. A room of 228 MB took as much in cleaning, half as much in what follows.
-_SECONDS_PER_MB = {
-    "stations": 0.1, "ownership": 1.2, "register": 1.2, "sift": 1.5, "exposure": 0.1,
-    "spacing": 0.1, "normals": 1.2, "floor": 0.05, "surface": 3.0, "trim": 0.4, "hygiene": 0.4,
-    "levels": 0.3, "tiles": 0.1, "unwrap": 1.7, "bake": 1.6, "pack": 0.15, "poster": 0.3,
-    "measure": 0.1,
-}  # fmt: skip
+from tourgen.expected import expected_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +98,7 @@ class Estimate:
         self._started = time.monotonic()
 
     def _expected_s(self, stages: tuple[str, ...]) -> float:
-        return sum(_SECONDS_PER_MB.get(stage, 0.02) for stage in stages) * self._scan_mb
+        return sum(expected_s(stage, self._scan_mb) for stage in stages)
 
     def done_share(self, ahead: tuple[str, ...]) -> float:
         """Share of the work that is done."""

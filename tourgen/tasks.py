@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field, is_dataclass
-from typing import Any, Generic, TypeVar, cast
+from dataclasses import asdict, dataclass, is_dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
 
 from tourgen.cache import Cache, Cost, Ingredients, key_of, library_version
-from tourgen.memory import PeakMemory
+from tourgen.memory import PeakMemory, give_back
+from tourgen.profile import sampled
+from tourgen.threads import use_threads
 
 Result = TypeVar("Result", covariant=True)
 
@@ -21,7 +24,7 @@ class Task(Generic[Result]):
     Attributes:
         name: The stage's name, one a room.
         run: Called with the inputs' results and, where there are any, the settings.
-        inputs: The tasks whose results it takes.
+        arguments: The tasks whose results it takes; those of a tuple come as a tuple.
         settings: A frozen dataclass, or None.
         ingredients: What its key is made of.
         key: Where its result is kept.
@@ -29,16 +32,21 @@ class Task(Generic[Result]):
 
     name: str
     run: Callable[..., Result]
-    inputs: tuple[Task[Any], ...]
+    arguments: tuple[Task[Any] | tuple[Task[Any], ...], ...]
     settings: Any
     ingredients: Ingredients
     key: str
+
+    @property
+    def inputs(self) -> tuple[Task[Any], ...]:
+        """The tasks whose results it takes, one after the other."""
+        return _flat_inputs(self.arguments)
 
 
 def task(
     name: str,
     run: Callable[..., Result],
-    *inputs: Task[Any],
+    *arguments: Task[Any] | tuple[Task[Any], ...],
     version: int,
     libraries: tuple[str, ...] = (),
     settings: Any = None,
@@ -49,7 +57,7 @@ def task(
     Args:
         name: The stage's name.
         run: The stage.
-        inputs: What it is fed.
+        arguments: The tasks that feed it; the results of a tuple of them come as one argument.
         version: Of the stage's code.
         libraries: Distributions whose version may change the result.
         settings: A frozen dataclass, the stage's last argument; None where it has none.
@@ -61,10 +69,18 @@ def task(
         "libraries": {library: library_version(library) for library in libraries},
         "settings": asdict(settings) if is_dataclass(settings) else None,  # type: ignore[arg-type]
         "files": list(digests),
-        "inputs": {each.name: each.key for each in inputs},
+        "inputs": {each.name: each.key for each in _flat_inputs(arguments)},
     }
     ingredients = json.loads(json.dumps(ingredients))  # as it will be read back: tuples are lists
-    return Task(name, run, inputs, settings, ingredients, key_of(ingredients))
+    return Task(name, run, arguments, settings, ingredients, key_of(ingredients))
+
+
+def _flat_inputs(arguments: tuple[Task[Any] | tuple[Task[Any], ...], ...]) -> tuple[Task[Any], ...]:
+    return tuple(
+        each
+        for argument in arguments
+        for each in (argument if isinstance(argument, tuple) else (argument,))
+    )
 
 
 def in_order(goals: tuple[Task[Any], ...]) -> tuple[Task[Any], ...]:
@@ -82,53 +98,74 @@ def in_order(goals: tuple[Task[Any], ...]) -> tuple[Task[Any], ...]:
     return tuple(each for goal in goals for each in walk(goal, seen))
 
 
-@dataclass
-class Runner:
-    """Runs the tasks of one room, each at most once, and only those that must.
-
-    A result is held while a later task still needs it and then let go.
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What a process needs to run a task.
 
     Attributes:
-        cache: Where results are kept.
-        goals: The tasks whose results are wanted.
-        announce: Told the task that is about to run.
-        ran: Names of the tasks that ran.
+        run: See ``Task``.
+        arguments: Keys of the results that it takes, as the task has them.
+        settings: See ``Task``.
+        key: Where its result is kept.
     """
 
-    cache: Cache
-    goals: tuple[Task[Any], ...]
-    announce: Callable[[Task[Any]], None]
-    ran: list[str] = field(default_factory=list)
-    _held: dict[str, Any] = field(default_factory=dict)
+    run: Callable[..., Any]
+    arguments: tuple[str | tuple[str, ...], ...]
+    settings: Any
+    key: str
 
-    def run(self) -> None:
-        """Make what is missing."""
-        missing = missing_tasks(self.cache, self.goals)
-        for position, each in enumerate(missing):
-            self._make(each)
-            needed = {i.key for later in missing[position + 1 :] for i in later.inputs}
-            self._held = {key: value for key, value in self._held.items() if key in needed}
+    @staticmethod
+    def of(each: Task[Any]) -> Job:
+        """The job of a task."""
+        keys = tuple(
+            tuple(task.key for task in argument) if isinstance(argument, tuple) else argument.key
+            for argument in each.arguments
+        )
+        return Job(each.run, keys, each.settings, each.key)
 
-    def result(self, each: Task[Result]) -> Result:
-        """The result of a task, from hand or cache; made anew where the entry is broken."""
-        if each.key not in self._held:
-            found = self.cache.load(each.key)
-            if found is None:
-                self._make(each)
-            else:
-                self._held[each.key] = found
-        return cast("Result", self._held[each.key])
 
-    def _make(self, each: Task[Any]) -> None:
-        inputs = [self.result(needed) for needed in each.inputs]
-        self.announce(each)
+def run_job(cache: Cache, job: Job, profiles: Path | None, threads: int) -> str | None:
+    """Run a task whose inputs are in the cache, and keep its result there.
+
+    Args:
+        cache: Of the tour.
+        job: The task's.
+        profiles: Folder for what is sampled of it; None: nothing is.
+        threads: That it may use.
+
+    Returns:
+        None, or the key of an input that is not there, or is broken.
+    """
+    with use_threads(threads), PeakMemory() as memory:
         started = time.perf_counter()
-        with PeakMemory() as memory:
-            result = each.run(*inputs, *(() if each.settings is None else (each.settings,)))
-        cost = Cost(round(time.perf_counter() - started, 3), memory.peak_mb)
-        self.cache.store(each.key, result, cost)
-        self._held[each.key] = result
-        self.ran.append(each.name)
+        try:
+            arguments = [_loaded(cache, argument) for argument in job.arguments]
+        except _LostError as lost:
+            return lost.key
+        with sampled(profiles and profiles / job.key):
+            result = job.run(*arguments, *(() if job.settings is None else (job.settings,)))
+        del arguments
+    cost = Cost(round(time.perf_counter() - started, 3), memory.peak_mb)
+    cache.store(job.key, result, cost)
+    del result
+    give_back()
+    return None
+
+
+class _LostError(Exception):
+    """An entry is not in the cache, or broken."""
+
+    def __init__(self, key: str) -> None:
+        self.key = key
+
+
+def _loaded(cache: Cache, argument: str | tuple[str, ...]) -> Any:
+    if isinstance(argument, tuple):
+        return tuple(_loaded(cache, key) for key in argument)
+    found = cache.load(argument)
+    if found is None:
+        raise _LostError(argument)
+    return found
 
 
 def missing_tasks(cache: Cache, goals: tuple[Task[Any], ...]) -> tuple[Task[Any], ...]:

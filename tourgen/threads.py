@@ -7,15 +7,26 @@ and of many.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+_NATIVE = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 VARIABLE = "TOURGEN_THREADS"
 """Of the environment: a process's share of the cores."""
+
+
+def limit_native_threads() -> None:
+    """Let libraries that are not loaded yet, here and in new processes, start no threads.
+
+    They would fight with ours for the cores, and sums would depend on how many there are.
+    """
+    for name in _NATIVE:
+        os.environ.setdefault(name, "1")
 
 
 def cores() -> int:
@@ -26,6 +37,20 @@ def cores() -> int:
 def threads() -> int:
     """Threads that this process may use: its share of the cores, where a build gave it one."""
     return int(os.environ.get(VARIABLE) or cores())
+
+
+@contextmanager
+def use_threads(count: int) -> Iterator[None]:
+    """Let work inside use so many threads."""
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = str(count)
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[VARIABLE]
+        else:
+            os.environ[VARIABLE] = before
 
 
 def each(job: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:

@@ -1,130 +1,169 @@
-"""Workers: rooms onto processes of this machine.
-
-Each process gets its share of the cores, so that native threads of two rooms never fight for
-the same ones. A room that fails is told and does not stop the others.
-"""
+"""Workers: where the tasks of a build run, in this process, in others, or on a dask cluster."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
-from multiprocessing.queues import SimpleQueue
 from threading import Thread
+from typing import Any, Protocol
 
-from tourgen import threads
-from tourgen.cache import Cache
-from tourgen.errors import StageError, TourgenError
-from tourgen.pipeline import RoomRecipe, RoomResult, build_room
-from tourgen.progress import Listener, Started
+from tourgen.errors import InputError, MissingTool
+from tourgen.threads import cores, limit_native_threads
 
-_THREAD_VARIABLES = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    threads.VARIABLE,
-)
-
-_events: SimpleQueue[Started | None]
+_ANSWER_S = 10
 
 
-def build_rooms(
-    recipes: tuple[RoomRecipe, ...], cache: Cache, jobs: int, listener: Listener
-) -> list[RoomResult | TourgenError]:
-    """Build rooms side by side.
+class Workers(Protocol):
+    """Run functions elsewhere.
 
-    Args:
-        recipes: Of the rooms.
-        cache: Of the tour.
-        jobs: How many rooms at once.
-        listener: Told each stage that starts, in this process.
-
-    Returns:
-        For each recipe the result, or why there is none.
+    Attributes:
+        most: Functions that run at once.
+        threads: That all of them may use together.
     """
-    if jobs == 1 or len(recipes) == 1:
-        return [_attempt(recipe, cache, listener) for recipe in recipes]
-    context = get_context("spawn")  # libraries that start threads do not survive a fork
-    events: SimpleQueue[Started | None] = context.SimpleQueue()
-    share = max(1, threads.cores() // jobs)
-    with (
-        _forwarding(events, listener),
-        _limited_threads(share),
-        ProcessPoolExecutor(jobs, context, _initialise, (events,)) as pool,
-    ):
-        futures = [pool.submit(_in_worker, recipe, cache) for recipe in recipes]
-        return [_outcome(recipe, future) for recipe, future in zip(recipes, futures, strict=True)]
+
+    most: int
+    threads: int
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
+        """Begin to run a function."""
+
+    def died(self, error: BaseException, /) -> bool:
+        """Whether a function failed since its process died; a new one takes its place."""
 
 
-def _attempt(recipe: RoomRecipe, cache: Cache, listener: Listener) -> RoomResult | TourgenError:
+class Here:
+    """This process, one function after the other."""
+
+    most = 1
+
+    def __init__(self) -> None:
+        self.threads = cores()
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
+        """Run a function to its end."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(*arguments))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+    def died(self, _: BaseException, /) -> bool:
+        """Never: it would be this one."""
+        return False
+
+
+class Processes:
+    """Processes of this machine, started when first needed."""
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self.threads = max(cores(), most)
+        self._pool = self._started()
+
+    def _started(self) -> ProcessPoolExecutor:
+        context = get_context("spawn")  # libraries that start threads do not survive a fork
+        return ProcessPoolExecutor(self.most, context, _die_with_parent)
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
+        """Run a function in a process that is free."""
+        return self._pool.submit(function, *arguments)
+
+    def died(self, error: BaseException, /) -> bool:
+        """A process that dies takes all others of its pool along."""
+        if not isinstance(error, BrokenProcessPool):
+            return False
+        self._pool.shutdown(wait=False)
+        self._pool = self._started()
+        return True
+
+    def stop(self) -> None:
+        """End the processes."""
+        self._pool.shutdown(cancel_futures=True)
+
+
+class Cluster:
+    """Workers of a dask cluster that see the tour's folder where this process sees it."""
+
+    def __init__(self, address: str) -> None:
+        """Connect.
+
+        Raises:
+            MissingTool: The library for it is not installed.
+            InputError: No scheduler answers at the address, or it has no workers.
+        """
+        try:
+            from distributed import Client
+        except ImportError:
+            raise MissingTool(
+                "--cluster: expected dask.distributed, found none",
+                'python3 -m pip install "tourgen[cluster]"',
+            ) from None
+        try:
+            self._client = Client(address, timeout=_ANSWER_S, set_as_default=False)
+        except (OSError, ValueError, TimeoutError):
+            raise InputError(
+                f"--cluster: expected a scheduler that answers at `{address}`, found none",
+                "start `dask scheduler` and `dask worker`, and give the address that it tells",
+            ) from None
+        about = self._client.scheduler_info(n_workers=-1)["workers"].values()
+        self.most = self.threads = sum(each["nthreads"] for each in about)
+        if not self.most:
+            self.stop()
+            raise InputError(
+                f"--cluster: expected workers at `{address}`, found none",
+                "start `dask worker` on each machine that shares the tour's folder",
+            )
+        self._executor = self._client.get_executor(pure=False)
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
+        """Run a function on a worker that is free."""
+        future: Future[Any] = self._executor.submit(function, *arguments)
+        return future
+
+    def died(self, error: BaseException, /) -> bool:
+        """Dask gives a task to other workers by itself, some times."""
+        from distributed import KilledWorker
+
+        return isinstance(error, KilledWorker)
+
+    def stop(self) -> None:
+        """Leave the cluster, which goes on."""
+        self._client.close()
+
+
+@contextmanager
+def workers(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
+    """Workers, for as long as the block lasts: those of a cluster, or so many of this machine."""
+    limit_native_threads()
+    if cluster:
+        there = Cluster(cluster)
+        try:
+            yield there
+        finally:
+            there.stop()
+        return
+    if jobs == 1:
+        yield Here()
+        return
+    processes = Processes(jobs)
     try:
-        return build_room(recipe, cache, listener)
-    except TourgenError as error:
-        return type(error)(f"room `{recipe.room.id}`: {error.message}", error.hint)
-    except MemoryError:
-        return StageError(
-            f"room `{recipe.room.id}`: expected enough memory, found none left",
-            "build fewer rooms at once with `--jobs 1`, or raise `surface.detail_mm`",
-        )
-
-
-def _initialise(events: SimpleQueue[Started | None]) -> None:
-    global _events  # a queue reaches a pool's process only this way
-    _events = events
-    Thread(target=_die_with_parent, daemon=True).start()
+        yield processes
+    finally:
+        processes.stop()
 
 
 def _die_with_parent() -> None:
     """A build that was killed leaves no process behind that works on for nobody."""
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
+    def wait() -> None:
+        parent = parent_process()
+        if parent is not None:
+            parent.join()
+            os._exit(1)
 
-def _in_worker(recipe: RoomRecipe, cache: Cache) -> RoomResult | TourgenError:
-    return _attempt(recipe, cache, _events.put)
-
-
-def _outcome(
-    recipe: RoomRecipe, future: Future[RoomResult | TourgenError]
-) -> RoomResult | TourgenError:
-    try:
-        return future.result()
-    except Exception as error:  # a process that died takes its room along, not the others
-        return StageError(
-            f"room `{recipe.room.id}`: expected a result, found {type(error).__name__}: {error}",
-            "build again: finished stages are kept; with too little memory use `--jobs 1`",
-        )
-
-
-@contextmanager
-def _forwarding(events: SimpleQueue[Started | None], listener: Listener) -> Iterator[None]:
-    def forward() -> None:
-        while (event := events.get()) is not None:
-            listener(event)
-
-    thread = Thread(target=forward, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        events.put(None)
-        thread.join()
-
-
-@contextmanager
-def _limited_threads(share: int) -> Iterator[None]:
-    """Processes started inside see these limits; libraries read them when they load."""
-    before = {name: os.environ.get(name) for name in _THREAD_VARIABLES}
-    os.environ.update(dict.fromkeys(_THREAD_VARIABLES, str(share)))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+    Thread(target=wait, daemon=True).start()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from box_tour import box_scan
 from PIL import Image
+from published import published_files
 from scan_files import cloud_table, write_ply
 
 from tourgen.cli import main
@@ -24,16 +25,6 @@ def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
     return json.loads(capsys.readouterr().out)
 
 
-def published(folder: Path) -> dict[str, bytes]:
-    """Every file of the site but the report, which tells how long things took."""
-    site = folder / "site"
-    return {
-        str(file.relative_to(site)): file.read_bytes()
-        for file in site.rglob("*")
-        if file.is_file() and file.stem != "report"
-    }
-
-
 def set_detail(folder: Path, room: str, detail_mm: int) -> None:
     file = folder / "tour.toml"
     head, tail = file.read_text(encoding="utf-8").split(f'id = "{room}"')
@@ -42,11 +33,11 @@ def set_detail(folder: Path, room: str, detail_mm: int) -> None:
 
 
 def test_a_second_build_runs_nothing(box_copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    before = published(box_copy)
+    before = published_files(box_copy / "site")
     assert not any(told(capsys, "plan", str(box_copy)).values())
     report = told(capsys, "build", str(box_copy))
     assert report["ran_stages"] == 0
-    assert published(box_copy) == before
+    assert published_files(box_copy / "site") == before
 
 
 def test_a_change_reaches_only_what_follows_it(
@@ -128,29 +119,29 @@ def test_a_surface_that_cannot_be_drawn_leaves_the_site_whole(
     hint: str,
 ) -> None:
     monkeypatch.setattr(crust, "Settings", partial(crust.Settings, most_points=1000))
-    before = published(box_copy)
+    before = published_files(box_copy / "site")
     tour = (box_copy / "tour.toml").read_text("utf-8")
     detail = "" if "detail_mm" in setting else "detail_mm = 30\n"
     tour = tour.replace("detail_mm = 30\n", f"{detail}{setting}\n", 1)
     (box_copy / "tour.toml").write_text(tour, "utf-8")
     capsys.readouterr()
-    assert main(["build", str(box_copy)]) == 2
+    assert main(["build", str(box_copy), "--jobs", "1"]) == 2
     output = capsys.readouterr().err
     (line,) = (line for line in output.splitlines() if line.startswith("error: "))
     assert line.startswith(f"error: room `left`: {said}")
     assert hint in output.partition("hint: ")[2]
-    assert published(box_copy) == before
+    assert published_files(box_copy / "site") == before
 
 
 def test_a_killed_build_goes_on(box_copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """An entry of the cache that was cut short counts as absent, and leads to the same site."""
-    before = published(box_copy)
+    before = published_files(box_copy / "site")
     results = sorted((box_copy / ".tourgen/results").glob("*/result.pickle"))
     smallest = min(results, key=lambda file: file.stat().st_size)
     smallest.write_bytes(smallest.read_bytes()[:-1])
     (box_copy / ".tourgen/results/aside-killed").mkdir()
     told(capsys, "build", str(box_copy))
-    assert published(box_copy) == before
+    assert published_files(box_copy / "site") == before
     assert not (box_copy / ".tourgen/results/aside-killed").exists()
 
 
@@ -160,7 +151,18 @@ def test_a_room_alone(box_copy: Path, capsys: pytest.CaptureFixture[str]) -> Non
     report = told(capsys, "build", str(box_copy), "--room", "right")
     assert report["rooms"]["left"]["ran"] == []
     set_detail(box_copy, "left", 50)
-    before = published(box_copy)
+    before = published_files(box_copy / "site")
     assert main(["build", str(box_copy), "--room", "right"]) == 2
     assert "room `left`" in capsys.readouterr().err
-    assert published(box_copy) == before
+    assert published_files(box_copy / "site") == before
+
+
+def test_a_flame_graph_is_written_that_asks_nobody_for_anything(box_copy: Path) -> None:
+    set_detail(box_copy, "right", 45)
+    page = box_copy / "profile.html"
+    assert main(["build", str(box_copy), "--profile", str(page)]) == 0
+    text = page.read_text("utf-8")
+    assert "signed_distance.py" in text
+    assert "bake" in text
+    assert "fonts.googleapis" not in text
+    assert not list(box_copy.glob(".profile-*"))

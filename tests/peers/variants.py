@@ -18,10 +18,11 @@ from tourgen.cache import Cache
 from tourgen.errors import TourgenError
 from tourgen.fitting.surface import Drawn
 from tourgen.pipeline import tour_recipes
-from tourgen.progress import Started
+from tourgen.scheduler import RoomTasks, run_missing
 from tourgen.stages.levels import Levels
-from tourgen.tasks import Runner, Task, in_order
+from tourgen.tasks import Task, in_order
 from tourgen.tour import Tour, load_tour
+from tourgen.workers import Here
 
 GALLERY_TOUR = f"""[tour]
 title = {{ en = "Gallery" }}
@@ -93,15 +94,14 @@ def drawn(tour: Tour, room: str, method: str, scratch: Path) -> Path | str:
 
 
 def _draw(variant: Tour, file: Path, why: Path) -> None:
-    tasks = _tasks(variant)
-    runner = Runner(Cache(variant.folder), tuple(tasks[name] for name in _NEEDED), _announce)
-    try:
-        runner.run()
-        levels: Levels = runner.result(tasks["levels"])
-        surface: Drawn = runner.result(tasks["surface"])
-    except TourgenError as error:
-        why.write_text(error.message, encoding="utf-8")
+    tasks, cache = _tasks(variant), Cache(variant.folder)
+    wanted = RoomTasks(tuple(tasks[name] for name in _NEEDED), 0.0)
+    outcome = run_missing({variant.start: wanted}, cache, Here(), _tell)[variant.start]
+    if isinstance(outcome, TourgenError):
+        why.write_text(outcome.message, encoding="utf-8")
         return
+    levels: Levels = cache.load(tasks["levels"].key)
+    surface: Drawn = cache.load(tasks["surface"].key)
     mesh = levels.finest
     aside = file.with_name(f".{file.name}")
     told = np.array(surface.told)
@@ -127,12 +127,11 @@ def built(variant: Tour) -> Path | str:
 
 def _build(variant: Tour, why: Path) -> None:
     try:
-        build_tour(variant, variant.folder / "site", _announce)
+        build_tour(variant, variant.folder / "site", lambda at: _tell(at.room, at.stage, at.ahead))
     except TourgenError as error:
         why.write_text(error.message, encoding="utf-8")
 
 
-def _announce(at: Task[Any] | Started) -> None:
-    stage = at.stage if isinstance(at, Started) else at.name
+def _tell(_room: str, stage: str, _ahead: tuple[str, ...]) -> None:
     if stage:  # "" when a room is done
         print(f"  {stage}", flush=True)

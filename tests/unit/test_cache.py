@@ -19,6 +19,28 @@ def test_a_result_comes_back(tmp_path: Path) -> None:
     assert cache.cost("k") == COST
 
 
+def test_arrays_are_mapped_and_what_is_written_to_them_is_not_kept(tmp_path: Path) -> None:
+    cache = Cache(tmp_path)
+    arrays = (np.arange(1000), np.empty((0, 3)), np.asfortranarray(np.eye(3)), np.ones(5)[::2])
+    cache.store("k", arrays, COST)
+    found = cache.load("k")
+    for one, other in zip(arrays, found, strict=True):
+        assert one.dtype == other.dtype
+        np.testing.assert_array_equal(one, other)
+    found[0][:] = 7
+    np.testing.assert_array_equal(cache.load("k")[0], arrays[0])
+
+
+def test_an_array_cut_short_or_flipped_counts_as_absent(tmp_path: Path) -> None:
+    cache = Cache(tmp_path)
+    for key, spoil in (("cut", lambda data: data[:-9]), ("flipped", lambda data: b"x" + data[1:])):
+        cache.store(key, np.arange(1000), COST)
+        (file,) = (tmp_path / ".tourgen").rglob(f"{key}/arrays.bin")
+        file.write_bytes(spoil(file.read_bytes()))
+        assert cache.load(key) is None
+        assert not cache.has(key)
+
+
 def test_an_absent_entry_is_none(tmp_path: Path) -> None:
     assert Cache(tmp_path).load("k") is None
     assert Cache(tmp_path).cost("k") is None

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
+from typing import TypeVar
 
 import numpy as np
 
+from tourgen.expected import SPLIT
 from tourgen.fitting.lengths import Corner, detail_m
 from tourgen.fitting.points import RoomScan, moved
 from tourgen.fitting.surface import Detail, Drawn
@@ -31,6 +34,7 @@ from tourgen.stages.spacing import FOURTH, Spacing, spacing_at
 from tourgen.tileset import tileset_json
 from tourgen.tour import Viewpoint
 
+Item = TypeVar("Item")
 _ROOT_TEXELS = 500_000
 _POSTER_QUALITY = 82
 
@@ -98,17 +102,44 @@ def entering(start: Viewpoint | None) -> Entering:
     return Entering(start.position, start.look_at) if start else Entering(None, None)
 
 
-def unwrapped(
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Some of a room's tiles, which one task works on; written as the end of its name."""
+
+    number: int
+    of: int
+
+    def __str__(self) -> str:
+        return f"{SPLIT}{self.number + 1}/{self.of}"
+
+    def take(self, room: Sequence[Item]) -> Sequence[Item]:
+        """This part of all tiles, or of what belongs to them; near ones are together."""
+        count = len(room)
+        return room[count * self.number // self.of : count * (self.number + 1) // self.of]
+
+
+PARTS = tuple(Part(number, 8) for number in range(8))
+
+
+def sized(
     room: tuple[Tile, ...], cloud: PointCloud, scan: RoomScan, asked: Texels
-) -> tuple[UvMesh, ...]:
-    """Unwrap each tile.
+) -> dict[str, float]:
+    """Edge of each tile's texels, metres, by its id.
 
     A leaf's texels are half as wide as the spacing of the samples that colour it, points and the
     nearest panorama's pixels, down to the size asked for; a branch's are twice those below it; the
     root's make a picture of a fixed size.
     """
-    texel_m = _texels(room, cloud.points, scan.panoramas, asked.texel_mm / 1000)
-    return tuple(unwrap.unwrap(tile.mesh, unwrap.Settings(texel_m[tile.id])) for tile in room)
+    return _texels(room, cloud.points, scan.panoramas, asked.texel_mm / 1000)
+
+
+def unwrapped(
+    part: Part, room: tuple[Tile, ...], texel_m: Mapping[str, float]
+) -> tuple[UvMesh, ...]:
+    """Unwrap the tiles of a part."""
+    return tuple(
+        unwrap.unwrap(tile.mesh, unwrap.Settings(texel_m[tile.id])) for tile in part.take(room)
+    )
 
 
 def _texels(
@@ -143,44 +174,68 @@ def _pixels_on(places: Float32, panoramas: tuple[Panorama, ...]) -> Float64:
     return density
 
 
-def baked(
-    unwrapped_tiles: tuple[UvMesh, ...],
+def continued(
     oriented: OrientedCloud,
     cloud: PointCloud,
+    simplified: levels.Levels,
+    settings: bake.Settings,
+) -> PointCloud:
+    """Points that continue the picture of floors where they were not seen."""
+    return bake.continued_floors(cloud, oriented, simplified.finest, settings)
+
+
+def indexed(
+    cloud: PointCloud,
+    unseen: PointCloud,
+    oriented: OrientedCloud,
+    texel_m: Mapping[str, float],
+) -> bake.ColorIndex:
+    """The colours of all points, to be looked up by place."""
+    return bake.color_index(cloud.joined(unseen), oriented, min(texel_m.values()))
+
+
+def overlooked(
     scan: RoomScan,
     joined: register.Registered,
     simplified: levels.Levels,
+    index: bake.ColorIndex,
+    settings: bake.VistaSettings,
+) -> tuple[bake.Vista, ...]:
+    """The panoramas, where there are any, made ready to colour the surface."""
+    return bake.vistas(moved(scan.panoramas, joined), simplified.finest, index, settings)
+
+
+def baked(
+    uv_meshes: tuple[UvMesh, ...],
+    index: bake.ColorIndex,
+    vistas: tuple[bake.Vista, ...],
     settings: bake.Settings,
 ) -> tuple[TexturedMesh, ...]:
-    """Bake each tile's picture from all points, and from panoramas where there are any."""
-    finest_m = min(each.texel_m for each in unwrapped_tiles)
-    unseen = bake.continued_floors(cloud, oriented, simplified.finest, settings)
-    index = bake.color_index(cloud.joined(unseen), oriented, finest_m)
-    panoramas = moved(scan.panoramas, joined)
-    vistas = bake.vistas(panoramas, simplified.finest, index, bake.VistaSettings())
-    return tuple(bake.bake(each, index, settings, vistas) for each in unwrapped_tiles)
+    """Bake the pictures of some tiles from all points, and from panoramas."""
+    return tuple(bake.bake(each, index, settings, vistas) for each in uv_meshes)
 
 
 def guessed(
-    unwrapped_tiles: tuple[UvMesh, ...],
     kept: sift.Sifted,
     joined: register.Registered,
     spacing: Spacing,
+    parts: tuple[tuple[UvMesh, ...], ...],
     asked: Detail,
 ) -> tuple[UInt8, ...]:
     """Which vertices of each tile no measurement stands behind."""
-    vertices = tuple(each.mesh.vertices for each in unwrapped_tiles)
+    vertices = tuple(each.mesh.vertices for part in parts for each in part)
     settings = inferred.Settings(detail_m(spacing, asked.detail_mm))
     return inferred.inferred(vertices, kept.cloud, joined.stations, settings)
 
 
 def packed(
     room: tuple[Tile, ...],
-    textured: tuple[TexturedMesh, ...],
     guessed: tuple[UInt8, ...],
+    parts: tuple[tuple[TexturedMesh, ...], ...],
     asked: Packing,
 ) -> Mapping[str, bytes]:
     """Pack all tiles on one quantisation grid, and write the tileset."""
+    textured = chain(*parts)
     vertices = np.concatenate([tile.mesh.vertices for tile in room])
     settings = pack.Settings(grid=pack.grid(vertices), quality=asked.quality)
     files = {
@@ -200,14 +255,14 @@ def entered(simplified: levels.Levels, joined: register.Registered, asked: Enter
 
 def pictured(
     room: tuple[Tile, ...],
-    textured: tuple[TexturedMesh, ...],
     view: View,
+    parts: tuple[tuple[TexturedMesh, ...], ...],
     settings: poster.Settings,
 ) -> bytes:
     """Render the first view from the finest level, as WebP."""
     from PIL import Image
 
-    leaves = [each for tile, each in zip(room, textured, strict=True) if not tile.children]
+    leaves = [each for tile, each in zip(room, chain(*parts), strict=True) if not tile.children]
     stream = io.BytesIO()
     picture = Image.fromarray(poster.poster(leaves, view, settings))
     picture.save(stream, "WEBP", quality=_POSTER_QUALITY, method=6)

@@ -61,6 +61,7 @@ def poisson(oriented: OrientedCloud, settings: Settings) -> Mesh:
         depth=settings.depth or octree_depth(points, settings.cell_m),
         scale=_SCALE,
         linear_fit=settings.linear_fit,
+        n_threads=1,  # what several find differs from run to run by the last bits
         full_depth=settings.full_depth,
         samples_per_node=settings.samples_per_node,
         point_weight=settings.point_weight,

@@ -1,0 +1,69 @@
+"""A build that is killed at any moment goes on where it stopped, and ends in the same site."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from published import published_files
+
+from tourgen.cli import main
+
+COMMAND = [sys.executable, "-m", "tourgen.cli", "build"]
+
+
+def killed(folder: Path, after_s: float) -> bool:
+    """Begin a build and kill it, with all its processes; whether it was still at it."""
+    build = subprocess.Popen(
+        [*COMMAND, str(folder)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        build.wait(after_s)
+    except subprocess.TimeoutExpired:
+        os.killpg(build.pid, signal.SIGKILL)
+        build.wait()
+        return True
+    return False
+
+
+def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, dict[str, str]]:
+    capsys.readouterr()
+    assert main([*arguments, "--json"]) == 0
+    found: dict[str, dict[str, str]] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def test_a_build_killed_at_any_moment_leads_to_the_same_site(
+    box_copy: Path, capsys: pytest.CaptureFixture[str], pytestconfig: pytest.Config
+) -> None:
+    """``--kills`` times, each from an empty cache, at a moment drawn from the build's length."""
+    before = published_files(box_copy / "site")
+    cache = box_copy / ".tourgen"
+    shutil.rmtree(cache)
+    begun = time.monotonic()
+    subprocess.run([*COMMAND, str(box_copy)], check=True, capture_output=True)
+    length_s = time.monotonic() - begun
+    rng = random.Random(0)
+    interrupted = 0
+    for _ in range(pytestconfig.getoption("--kills")):
+        shutil.rmtree(cache)
+        interrupted += killed(box_copy, rng.uniform(0.1, 1.0) * length_s)
+        assert published_files(box_copy / "site") == before, "the site published before is whole"
+        plan = told(capsys, "plan", str(box_copy))
+        report = told(capsys, "build", str(box_copy))
+        for room, stages in plan.items():
+            ran = report["rooms"][room]["ran"]  # type: ignore[index]
+            assert list(ran) == list(stages), "what was finished is not done again"
+        assert published_files(box_copy / "site") == before
+    assert interrupted
