@@ -14,13 +14,21 @@ import numpy as np
 from tourgen.cache import Cache
 from tourgen.errors import Faults, InputError, TourgenError
 from tourgen.geometry import View
-from tourgen.pipeline import RoomRecipe, RoomResult, build_rooms, planned, tour_recipes
+from tourgen.pipeline import (
+    RoomRecipe,
+    RoomResult,
+    build_rooms,
+    planned,
+    sources,
+    tour_recipes,
+)
 from tourgen.profile import require_profiler, write_flame_graph
 from tourgen.progress import Listener
 from tourgen.report import tour_report
 from tourgen.site import BuiltRoom, write_site
 from tourgen.threads import cores
 from tourgen.tour import Link, Tour, Viewpoint
+from tourgen.unchanged import remember_build
 from tourgen.workers import Workers, workers
 
 _STEP_INSIDE_M = 0.9
@@ -101,6 +109,7 @@ def build_tour(
     report = tour_report(rooms, time.perf_counter() - started)
     write_site(tour, _published(tour, {room.id: room for room in rooms}), report, out)
     cache.prune(frozenset(key for recipe in recipes for key in recipe.keys))
+    remember_build(tour.folder, out, sources(tour))
     return report
 
 

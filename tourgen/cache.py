@@ -62,6 +62,12 @@ def library_version(name: str) -> str:
     return "absent"
 
 
+def stamp_of(file: Path) -> str:
+    """Of a file's state: its size and time of change."""
+    about = file.stat()
+    return f"{about.st_size}-{about.st_mtime_ns}"
+
+
 class Cache:
     """The results of one tour, in ``DIR/.tourgen``."""
 
@@ -101,20 +107,24 @@ class Cache:
         """Keep a result; a second store of one key changes nothing."""
         self._results.mkdir(parents=True, exist_ok=True)
         aside = Path(tempfile.mkdtemp(prefix="aside-", dir=self._results))
+        try:
+            self._fill(aside, result, cost)
+            aside.rename(self._results / key)
+        except OSError:
+            shutil.rmtree(aside, ignore_errors=True)
+            if not self.has(key):  # else another process stored it first
+                raise
+
+    def _fill(self, aside: Path, result: Any, cost: Cost) -> None:
         arrays: list[pickle.PickleBuffer] = []
-        (aside / _RESULT).write_bytes(
-            pickle.dumps(result, protocol=5, buffer_callback=arrays.append)
-        )
+        data = pickle.dumps(result, protocol=5, buffer_callback=arrays.append)
+        (aside / _RESULT).write_bytes(data)
         about = {
             "arrays": _written(arrays, aside / _ARRAYS),
             "sha256": _digest(aside),
             "cost": {"seconds": cost.seconds, "peak_rss_mb": cost.peak_rss_mb},
         }
         (aside / "about.json").write_text(json.dumps(about))
-        try:
-            aside.rename(self._results / key)
-        except OSError:  # another process stored it first
-            shutil.rmtree(aside)
 
     def prune(self, keep: frozenset[str], limit_bytes: int = _LIMIT_BYTES) -> None:
         """Drop leftovers of killed builds, then the longest unused entries over the limit."""
@@ -153,8 +163,7 @@ class Cache:
         known = self._read_json("digests.json")
         digests = {}
         for file in files:
-            stat = file.stat()
-            stamp = f"{stat.st_size}-{stat.st_mtime_ns}"
+            stamp = stamp_of(file)
             entry = known.get(str(file))
             if entry is None or entry["stamp"] != stamp:
                 with file.open("rb") as stream:

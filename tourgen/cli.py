@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import sys
 from collections.abc import Callable, Sequence
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tourgen import __version__
-from tourgen.errors import Faults, InputError, TourgenError
+from tourgen.errors import Faults, InputError, StageError, TourgenError
 from tourgen.threads import limit_native_threads
 
 OUTPUT = "site"
@@ -32,6 +33,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except TourgenError as error:
         _tell(error)
         return error.exit_code
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        _tell(StageError("disk: expected room, found none left", "free some, and build again"))
+        return StageError.exit_code
     except KeyboardInterrupt:
         print("stopped; the next build goes on from the last finished stage", file=sys.stderr)
         return 130
@@ -157,23 +163,10 @@ def _plan(asked: argparse.Namespace) -> int:
 
 
 def _build(asked: argparse.Namespace) -> int:
-    limit_native_threads()  # before anything loads such libraries
-    from tourgen.build import build_tour
-    from tourgen.progress import ProgressBars
-    from tourgen.tour import check_tour
+    from tourgen.unchanged import last_report
 
-    tour, _ = check_tour(asked.folder)
     out = asked.output or asked.folder / OUTPUT
-    with ProgressBars() as bars:
-        report = build_tour(
-            tour,
-            out,
-            bars,
-            only=asked.room,
-            jobs=asked.jobs,
-            cluster=asked.cluster,
-            profile=asked.profile,
-        )
+    report = last_report(asked.folder, out) or _built(asked, out)
     if asked.json:
         _print_json(report)
         return 0
@@ -187,6 +180,26 @@ def _build(asked: argparse.Namespace) -> int:
     )
     print(f"to walk through it: tourgen serve {asked.folder if not asked.output else out}")
     return 0
+
+
+def _built(asked: argparse.Namespace, out: Path) -> Any:
+    """Build, and report."""
+    limit_native_threads()  # before anything loads such libraries
+    from tourgen.build import build_tour
+    from tourgen.progress import ProgressBars
+    from tourgen.tour import check_tour
+
+    tour, _ = check_tour(asked.folder)
+    with ProgressBars() as bars:
+        return build_tour(
+            tour,
+            out,
+            bars,
+            only=asked.room,
+            jobs=asked.jobs,
+            cluster=asked.cluster,
+            profile=asked.profile,
+        )
 
 
 def _serve(asked: argparse.Namespace) -> int:

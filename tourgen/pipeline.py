@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tourgen.cache import Cache, Cost
+from tourgen.cache import Cache, Cost, stamp_of
 from tourgen.errors import TourgenError
 from tourgen.expected import stage_of
 from tourgen.fitting import picture, points, surface
@@ -88,9 +88,10 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         digests: Of the scans' contents, by path.
     """
     detail_mm = room.surface.detail_mm
+    stamps = {each.file: stamp_of(folder / each.file) for each in room.scans}
     scanned = task(
         "scan",
-        partial(points.read, room, folder),
+        partial(points.read, room, folder, stamps),
         settings=points.reading(room),
         digests=tuple(digests[folder / each.file] for each in room.scans),
         version=3,
@@ -159,7 +160,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
             settings=surface.Mended(room.mesh, room.unit, room.up),
             digests=(digests[folder / room.mesh],),
             version=1,
-            libraries=("trimesh",),
+            libraries=("numba", "trimesh"),
         )
         if room.mesh
         else task(
@@ -192,7 +193,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         trimmed,
         settings=hygiene.Settings(),
         version=hygiene.VERSION,
-        libraries=("trimesh",),
+        libraries=("numba", "trimesh"),
     )
     simplified = task(
         "levels",
@@ -376,11 +377,15 @@ class RoomResult:
     ran: tuple[str, ...]
 
 
+def sources(tour: Tour) -> list[Path]:
+    """The scans of a tour, and the meshes that were mended elsewhere."""
+    files = [tour.folder / scan.file for room in tour.rooms for scan in room.scans]
+    return files + [tour.folder / room.mesh for room in tour.rooms if room.mesh]
+
+
 def tour_recipes(tour: Tour, cache: Cache) -> tuple[RoomRecipe, ...]:
     """The recipe of every room."""
-    files = [tour.folder / scan.file for room in tour.rooms for scan in room.scans]
-    files += [tour.folder / room.mesh for room in tour.rooms if room.mesh]
-    digests = cache.file_digests(files)
+    digests = cache.file_digests(sources(tour))
     return tuple(room_recipe(room, tour.folder, digests) for room in tour.rooms)
 
 

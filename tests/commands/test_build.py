@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import re
+import shutil
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,6 +21,7 @@ from scan_files import cloud_table, write_ply
 
 from tourgen.cli import main
 from tourgen.stages.surface import crust
+from tourgen.unchanged import last_report
 
 
 def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
@@ -166,3 +172,45 @@ def test_a_flame_graph_is_written_that_asks_nobody_for_anything(box_copy: Path) 
     assert "bake" in text
     assert "fonts.googleapis" not in text
     assert not list(box_copy.glob(".profile-*"))
+
+
+@pytest.mark.parametrize("spoiled", ["site/index.html", "tour.toml", "scans/left.ply"])
+def test_only_an_untouched_tour_is_told_at_once(
+    box_copy: Path, capsys: pytest.CaptureFixture[str], spoiled: str
+) -> None:
+    """Any file that is touched has the stages looked through; none of them runs for that."""
+    told(capsys, "build", str(box_copy))
+    before = published_files(box_copy / "site")
+    assert last_report(box_copy, box_copy / "site")
+    assert told(capsys, "build", str(box_copy))["ran_stages"] == 0
+    assert last_report(box_copy, box_copy / "elsewhere") is None
+    file = box_copy / spoiled
+    file.write_bytes(file.read_bytes() + (b"#" if spoiled != "scans/left.ply" else b""))
+    os.utime(file, (1e9, 1e9))
+    assert last_report(box_copy, box_copy / "site") is None
+    assert told(capsys, "build", str(box_copy))["ran_stages"] == 0
+    assert published_files(box_copy / "site") == before
+
+
+def test_a_disk_that_fills_is_one_clear_line(box_copy: Path, tmp_path: Path) -> None:
+    """On a file system of its own, too small for the cache; with room, the build goes on."""
+    before = published_files(box_copy / "site")
+    shutil.rmtree(box_copy / ".tourgen")
+    disk, errors = tmp_path / "disk", tmp_path / "errors"
+    disk.mkdir()
+    build = f"{sys.executable} -m tourgen.cli build {disk}/tour"
+    script = f"""
+        mount -t tmpfs -o size=9m tmpfs {disk} && cp -r {box_copy} {disk}/tour || exit 99
+        {build} 2>{errors}; code=$?
+        cp -r {disk}/tour/site {tmp_path}/left
+        mount -o remount,size=200m {disk} && {build} >&2 && cp -r {disk}/tour/site {tmp_path}/mended
+        exit $code
+    """
+    alone = ["unshare", "--mount", *(["--map-root-user"] if os.geteuid() else [])]
+    ended = subprocess.run([*alone, "sh", "-c", script], capture_output=True, text=True)
+    assert ended.returncode == 1, ended.stderr
+    lines = [line for line in errors.read_text("utf-8").splitlines() if "error" in line.lower()]
+    assert lines, errors.read_text("utf-8")
+    assert all(re.match("error: .*expected room.*, found none left$", line) for line in lines)
+    assert published_files(tmp_path / "left") == before
+    assert published_files(tmp_path / "mended") == before

@@ -13,6 +13,8 @@ from tourgen.geometry import OrientedCloud, TexturedMesh, UvMesh
 from tourgen.raster import rasterize
 from tourgen.stages import unwrap
 from tourgen.stages.bake import Settings, bake, color_index
+from tourgen.stages.bake.points import of_points
+from tourgen.stages.bake.texels import texels_of
 
 TEXEL_M = 0.01
 UP = (0.0, 0.0, 1.0)
@@ -178,3 +180,17 @@ def test_an_empty_cloud_is_an_error() -> None:
     cloud = scanned(np.zeros((0, 3)), np.zeros((0, 3)))
     with pytest.raises(StageError, match="at least 1 point, found 0"):
         color_index(cloud.cloud, cloud, TEXEL_M)
+
+
+def test_texels_between_faces_that_look_opposite_ways_get_a_colour_too() -> None:
+    """Their normals cancel; a texel that is no number would black out all those about it."""
+    points = spread(20_000)
+    cloud = scanned(points, np.tile((200, 150, 120), (20_000, 1)))
+    texels = texels_of(unwrap.unwrap(sheet(1.0, 1.0, 8), unwrap.Settings(TEXEL_M)))
+    normals = texels.normals.copy()
+    normals[::7] = 0
+    texels = replace(texels, normals=normals)
+    index = color_index(cloud.cloud, cloud, TEXEL_M)
+    told = of_points(texels, index, TEXEL_M, Settings(), np.zeros(len(texels.row), np.float32))
+    assert np.isfinite(told.colors).all()
+    assert told.colors.min() > 100

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scan_files import cloud_table, write_ply
 
+from tourgen.cache import stamp_of
 from tourgen.errors import InputError
 from tourgen.fitting.plausible import require_room
 from tourgen.fitting.points import read, reading
@@ -17,7 +18,7 @@ POINTS = np.random.default_rng(0).uniform((-2, -1.5, 0), (2, 1.5, 2.5), (12_000,
 def read_as(tmp_path, unit, points) -> tuple[PointCloud, ReadFacts]:
     write_ply(tmp_path / "a.ply", cloud_table(points, np.full(points.shape, 9, np.uint8)))
     room = Room(id="a", scans=["a.ply"], unit=unit)
-    scan = read(room, tmp_path, reading(room))
+    scan = read(room, tmp_path, {"a.ply": stamp_of(tmp_path / "a.ply")}, reading(room))
     return scan.cloud, scan.facts
 
 
@@ -71,3 +72,14 @@ def test_a_scan_given_twice_is_read_once(tmp_path):
     cloud, facts = read_as(tmp_path, "m", np.concatenate([POINTS, POINTS]))
     assert np.abs(cloud.points - POINTS).max() < 1e-6
     assert (facts.points_read, facts.dropped_repeated) == (24_000, 12_000)
+
+
+@pytest.mark.parametrize(("spoil", "told"), [("write_bytes", "changed"), ("unlink", "gone")])
+def test_a_scan_that_changes_under_the_build_is_told(tmp_path, spoil, told):
+    file = tmp_path / "a.ply"
+    write_ply(file, cloud_table(POINTS, np.full(POINTS.shape, 9, np.uint8)))
+    stamps = {"a.ply": stamp_of(file)}
+    getattr(file, spoil)(*([file.read_bytes()[:-30]] if spoil == "write_bytes" else []))
+    room = Room(id="a", scans=["a.ply"])
+    with pytest.raises(InputError, match=f"expected it as it was .*, found it {told}"):
+        read(room, tmp_path, stamps, reading(room))

@@ -5,12 +5,14 @@ Each function runs one stage with settings that follow from the tour file and th
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tourgen.cache import stamp_of
 from tourgen.errors import InputError
 from tourgen.fitting.lengths import Corner, corners, detail_m
 from tourgen.fitting.plausible import require_room
@@ -89,14 +91,22 @@ def reading(room: Room) -> Reading:
     )
 
 
-def read(room: Room, folder: Path, _: Reading) -> RoomScan:
+def read(room: Room, folder: Path, stamps: Mapping[str, str], _: Reading) -> RoomScan:
     """Read a room's scans; the settings are those of the room, gathered for the key.
 
+    Args:
+        room: Whose.
+        folder: Where the files' paths start.
+        stamps: Of the files when the build began, by path.
+
     Raises:
-        InputError: A scan cannot be read, or what they hold cannot be a room.
+        InputError: A scan cannot be read, or what they hold cannot be a room, or a file is no
+            longer the one that the build began with.
     """
+    _require_unchanged(folder, stamps)
     scans = open_scans(room, folder)
     cloud, found, facts = read_room(scans, room.keep, room.remove, room.clean.min_points)
+    _require_unchanged(folder, stamps)
     count = len(cloud)
     cloud = without_repeats(cloud)
     facts = replace(facts, dropped_repeated=count - len(cloud))
@@ -109,6 +119,17 @@ def read(room: Room, folder: Path, _: Reading) -> RoomScan:
     if len(found) != len(given):
         cloud = replace(cloud, station=np.full_like(cloud.station, -1))
     return RoomScan(cloud, given, panoramas, facts)
+
+
+def _require_unchanged(folder: Path, stamps: Mapping[str, str]) -> None:
+    for file, stamp in stamps.items():
+        there = (folder / file).exists()
+        if not there or stamp_of(folder / file) != stamp:
+            raise InputError(
+                f"scan `{file}`: expected it as it was when the build began, "
+                f"found it {'changed' if there else 'gone'}",
+                "build again when it is whole",
+            )
 
 
 def stations_of(scan: RoomScan, settings: stations.Settings) -> Float64:

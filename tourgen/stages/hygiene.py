@@ -13,9 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from tourgen.compiled import compiled
 from tourgen.errors import StageError
-from tourgen.geometry import Float32, Mesh
-from tourgen.stages.mesh_arrays import compact, components, edges, face_adjacency, face_areas
+from tourgen.geometry import Float32, Int32, Mesh
+from tourgen.stages.mesh_arrays import (
+    compact,
+    components,
+    edge_faces,
+    face_adjacency,
+    face_areas,
+)
 
 VERSION = 3
 
@@ -73,11 +80,23 @@ def _is_rod(vertices: Float32, settings: Settings) -> bool:
 
 def _without_overfull_edges(mesh: Mesh) -> Mesh:
     """Drop the smallest faces of each edge that more than two faces share."""
-    edge = np.sort(edges(mesh.faces), axis=1)
-    face = np.repeat(np.arange(len(mesh.faces)), 3)
-    order = np.lexsort((-face_areas(mesh)[face], edge[:, 0] << 32 | edge[:, 1]))
-    key = (edge[:, 0] << 32 | edge[:, 1])[order]
-    third = np.flatnonzero(key[2:] == key[:-2]) + 2
-    keep = np.ones(len(mesh.faces), bool)
-    keep[face[order[third]]] = False
-    return compact(mesh, keep)
+    starts, high, owner = edge_faces(mesh.faces)
+    return compact(mesh, ~_overfull(starts, high, owner, face_areas(mesh)))
+
+
+@compiled
+def _overfull(
+    starts: npt.NDArray[np.int64], high: Int32, owner: Int32, area_m2: Float32
+) -> npt.NDArray[np.bool_]:
+    """(f,) faces of an edge that has two others which are no smaller."""
+    found = np.zeros(len(area_m2), np.bool_)
+    for i in range(len(starts) - 1):
+        for place in range(starts[i], starts[i + 1]):
+            larger = 0
+            for other in range(starts[i], starts[i + 1]):
+                if high[other] != high[place]:
+                    continue
+                own, theirs = area_m2[owner[place]], area_m2[owner[other]]
+                larger += theirs > own or (theirs == own and other < place)
+            found[owner[place]] |= larger >= 2
+    return found

@@ -1,4 +1,4 @@
-"""What several mesh stages ask of faces, in numpy."""
+"""What several mesh stages ask of faces."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import numpy.typing as npt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from tourgen.geometry import Int32, Mesh
+from tourgen.compiled import compiled
+from tourgen.geometry import Float32, Int32, Mesh
 
 STEP_M = 2.0**-12
 """Of the grid that published vertices lie on, 0.244 mm: a float32 holds its positions exactly."""
@@ -27,8 +28,11 @@ def on_grid(mesh: Mesh) -> Mesh:
 
 def compact(mesh: Mesh, keep: npt.NDArray[np.generic]) -> Mesh:
     """The faces that ``keep`` (a mask or positions) selects, without unused vertices."""
-    used, faces = np.unique(mesh.faces[keep], return_inverse=True)
-    return Mesh(mesh.origin, mesh.vertices[used], faces.reshape(-1, 3).astype(np.int32))
+    faces = mesh.faces[keep]
+    used = np.zeros(len(mesh.vertices), np.bool_)
+    used[faces] = True
+    number = np.cumsum(used, dtype=np.int32) - np.int32(1)
+    return Mesh(mesh.origin, mesh.vertices[used], number[faces])
 
 
 def face_areas(mesh: Mesh) -> npt.NDArray[np.float32]:
@@ -38,22 +42,18 @@ def face_areas(mesh: Mesh) -> npt.NDArray[np.float32]:
 
 def face_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
     """Unit normal of each face, zero where it has no area."""
-    normal = _doubled_normals(mesh)
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.asarray(normal / np.maximum(length, 1e-20), np.float32)
+    return _unit(_doubled_normals(mesh))
 
 
 def vertex_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
     """Unit normal of each vertex, of the faces around it by their areas; zero where none has."""
-    of_faces = _doubled_normals(mesh)
-    normal = np.stack([_sum_at_vertices(mesh, of_faces[:, axis]) for axis in range(3)], axis=1)
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.asarray(normal / np.maximum(length, 1e-20), np.float32)
+    return _unit(_at_vertices(mesh.faces, _doubled_normals(mesh), len(mesh.vertices)))
 
 
 def vertex_areas(mesh: Mesh) -> npt.NDArray[np.float64]:
     """A third of the faces around each vertex, square metres."""
-    return _sum_at_vertices(mesh, face_areas(mesh) / 3)
+    third = face_areas(mesh)[:, None] / 3
+    return _at_vertices(mesh.faces, third, len(mesh.vertices))[:, 0]
 
 
 def edges(faces: Int32) -> npt.NDArray[np.int64]:
@@ -61,24 +61,91 @@ def edges(faces: Int32) -> npt.NDArray[np.int64]:
     return faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
 
 
-def _sum_at_vertices(mesh: Mesh, of_faces: npt.NDArray[np.floating]) -> npt.NDArray[np.float64]:
-    count = len(mesh.vertices)
-    summed = np.bincount(mesh.faces.reshape(-1), np.repeat(of_faces, 3), minlength=count)
-    return np.asarray(summed, np.float64)
+def _unit(vectors: npt.NDArray[np.floating]) -> npt.NDArray[np.float32]:
+    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    return np.asarray(vectors / np.maximum(length, 1e-20), np.float32)
 
 
 def _doubled_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
-    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    return np.asarray(np.cross(b - a, c - a), np.float32)
+    """(f, 3) across each face, twice as long as it is large."""
+    found = np.empty((len(mesh.faces), 3), np.float32)
+    _cross(mesh.vertices, mesh.faces, found)
+    return found
 
 
+@compiled
+def _cross(vertices: Float32, faces: Int32, found: Float32) -> None:
+    """Write the cross product of two edges of each face."""
+    for i in range(len(faces)):
+        a, b, c = faces[i, 0], faces[i, 1], faces[i, 2]
+        px, qx = vertices[b, 0] - vertices[a, 0], vertices[c, 0] - vertices[a, 0]
+        py, qy = vertices[b, 1] - vertices[a, 1], vertices[c, 1] - vertices[a, 1]
+        pz, qz = vertices[b, 2] - vertices[a, 2], vertices[c, 2] - vertices[a, 2]
+        found[i, 0] = py * qz - pz * qy
+        found[i, 1] = pz * qx - px * qz
+        found[i, 2] = px * qy - py * qx
+
+
+@compiled
+def _at_vertices(
+    faces: Int32, of_faces: npt.NDArray[np.floating], count: int
+) -> npt.NDArray[np.float64]:
+    """(count, k) the sum of (f, k) values of faces around each vertex."""
+    total = np.zeros((count, of_faces.shape[1]), np.float64)
+    for i in range(len(faces)):
+        for corner in range(3):
+            for k in range(of_faces.shape[1]):
+                total[faces[i, corner], k] += of_faces[i, k]
+    return total
+
+
+@compiled
 def face_adjacency(faces: Int32) -> npt.NDArray[np.int64]:
     """(m, 2) pairs of faces that share an edge; an edge of more than two faces gives a chain."""
-    edge = np.sort(edges(faces), axis=1)
-    key = edge[:, 0] << 32 | edge[:, 1]
-    order = np.argsort(key, kind="stable")
-    same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
-    return np.stack([order[same], order[same + 1]], axis=1) // 3
+    starts, high, owner = edge_faces(faces)
+    pairs = np.empty((len(high), 2), np.int64)
+    found = 0
+    for i in range(len(starts) - 1):
+        for place in range(starts[i] + 1, starts[i + 1]):
+            if high[place] == high[place - 1]:
+                pairs[found, 0], pairs[found, 1] = owner[place - 1], owner[place]
+                found += 1
+    return pairs[:found].copy()
+
+
+@compiled
+def edge_faces(faces: Int32) -> tuple[npt.NDArray[np.int64], Int32, Int32]:
+    """Which faces each edge has, sorted by its lower vertex, then its higher one, then the face.
+
+    Args:
+        faces: (f, 3)
+
+    Returns:
+        (v + 1,) where the edges of each lower vertex begin, (3 f,) their higher vertices, and
+        (3 f,) their faces.
+    """
+    count = 0
+    for face in faces:
+        count = max(count, face.max() + 1)
+    starts = np.zeros(count + 1, np.int64)
+    for face in faces:
+        for k in range(3):
+            starts[min(face[k], face[(k + 1) % 3]) + 1] += 1
+    for i in range(count):
+        starts[i + 1] += starts[i]
+    high, owner = np.empty(3 * len(faces), np.int32), np.empty(3 * len(faces), np.int32)
+    at = starts[:-1].copy()
+    for i in range(len(faces)):
+        for k in range(3):
+            one, other = faces[i, k], faces[i, (k + 1) % 3]
+            low = min(one, other)
+            place = at[low]
+            at[low] += 1
+            while place > starts[low] and high[place - 1] > max(one, other):
+                high[place], owner[place] = high[place - 1], owner[place - 1]
+                place -= 1
+            high[place], owner[place] = max(one, other), i
+    return starts, high, owner
 
 
 def components(pairs: npt.NDArray[np.int64], count: int) -> Int32:
@@ -89,10 +156,23 @@ def components(pairs: npt.NDArray[np.int64], count: int) -> Int32:
 
 def regions(mesh: Mesh, at: npt.NDArray[np.int64]) -> Int32:
     """Number of the connected region that each chosen vertex lies in."""
-    number = np.full(len(mesh.vertices), -1)
+    number = np.full(len(mesh.vertices), -1, np.int64)
     number[at] = np.arange(len(at))
-    pair = number[edges(mesh.faces)]
-    return components(pair[np.all(pair >= 0, axis=1)], len(at))
+    return components(_among(mesh.faces, number), len(at))
+
+
+@compiled
+def _among(faces: Int32, number: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """(m, 2) the edges between vertices that have a number, by these."""
+    pairs = np.empty((3 * len(faces), 2), np.int64)
+    found = 0
+    for face in faces:
+        for k in range(3):
+            one, other = number[face[k]], number[face[(k + 1) % 3]]
+            if one >= 0 and other >= 0:
+                pairs[found, 0], pairs[found, 1] = one, other
+                found += 1
+    return pairs[:found].copy()
 
 
 def weld(meshes: list[Mesh]) -> Mesh:

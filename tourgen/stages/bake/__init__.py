@@ -37,7 +37,7 @@ __all__ = [
     "vistas",
 ]
 
-VERSION = 10
+VERSION = 11
 
 
 def bake(

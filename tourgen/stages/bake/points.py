@@ -389,10 +389,10 @@ def _blend_blocks(
 
 @compiled
 def _across(normal: Float32, frame: Float32) -> None:
-    """Write two unit vectors across a unit normal."""
+    """Write two unit vectors across a unit normal; none where faces' normals cancel."""
     least = np.argmin(np.abs(normal))
     one, other = (least + 1) % 3, (least + 2) % 3
-    length = np.sqrt(normal[one] ** 2 + normal[other] ** 2)
+    length = max(np.sqrt(normal[one] ** 2 + normal[other] ** 2), np.float32(1e-12))
     frame[0, least] = 0
     frame[0, one], frame[0, other] = -normal[other] / length, normal[one] / length
     for i in range(3):
