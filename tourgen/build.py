@@ -24,14 +24,17 @@ from tourgen.pipeline import (
 )
 from tourgen.profile import require_profiler, write_flame_graph
 from tourgen.progress import Listener
+from tourgen.remote import has_fetched, is_remote, send
 from tourgen.report import tour_report
 from tourgen.site import BuiltRoom, write_site
 from tourgen.threads import cores
 from tourgen.tour import Link, Tour, Viewpoint
-from tourgen.unchanged import remember_build
+from tourgen.unchanged import forget_build, remember_build
 from tourgen.workers import Workers, workers
 
 _STEP_INSIDE_M = 0.9
+_SENT = Path(".tourgen") / "sent"
+"""Where a site is kept that is sent elsewhere."""
 
 
 class RoomsFailed(TourgenError):
@@ -67,7 +70,7 @@ def plan_tour(tour: Tour) -> tuple[Planned, ...]:
 
 def build_tour(
     tour: Tour,
-    out: Path,
+    out: Path | str,
     listener: Listener,
     *,
     only: Sequence[str] = (),
@@ -79,7 +82,7 @@ def build_tour(
 
     Args:
         tour: What tour.toml says.
-        out: The site's folder, swapped in whole.
+        out: The site's folder, swapped in whole; or an address that it is sent to.
         listener: Told each stage that starts.
         only: Ids of the rooms to build; the others must have been built before. Empty: all.
         jobs: Tasks that run at once; as many as there are cores if left out.
@@ -91,6 +94,7 @@ def build_tour(
 
     Raises:
         InputError: ``only`` cannot be used, or the output folder.
+        MissingTool: The library for the address is not installed.
         RoomsFailed: Rooms could not be built.
     """
     started = time.perf_counter()
@@ -98,28 +102,35 @@ def build_tour(
     recipes = tour_recipes(tour, cache)
     _require_built(recipes, [tour.room(room_id).id for room_id in only], cache)
     at_work = any(planned(recipe, cache) for recipe in recipes)
-    with workers((jobs or cores()) if at_work else 1, cluster if at_work else None) as here:
+    with workers((jobs or cores()) if at_work else 1, cluster if at_work else None) as crew:
         if profile:
-            outcomes = _profiled(recipes, cache, here, listener, profile)
+            outcomes = _profiled(recipes, cache, crew, listener, profile)
         else:
-            outcomes = build_rooms(recipes, cache, here, listener)
+            outcomes = build_rooms(recipes, cache, crew, listener)
     rooms = [outcome for outcome in outcomes if isinstance(outcome, RoomResult)]
     if len(rooms) < len(outcomes):
         raise RoomsFailed(tuple(each for each in outcomes if isinstance(each, TourgenError)))
     report = tour_report(rooms, time.perf_counter() - started)
-    write_site(tour, _published(tour, {room.id: room for room in rooms}), report, out)
+    sent = is_remote(str(out))
+    here = tour.folder / _SENT if sent else Path(out)
+    write_site(tour, _published(tour, {room.id: room for room in rooms}), report, here)
+    if sent:
+        send(here, str(out))
     cache.prune(frozenset(key for recipe in recipes for key in recipe.keys))
-    remember_build(tour.folder, out, sources(tour))
+    if sent or has_fetched(tour.folder):
+        forget_build(tour.folder)
+    else:
+        remember_build(tour.folder, here, sources(tour))
     return report
 
 
 def _profiled(
-    recipes: Sequence[RoomRecipe], cache: Cache, here: Workers, listener: Listener, page: Path
+    recipes: Sequence[RoomRecipe], cache: Cache, crew: Workers, listener: Listener, page: Path
 ) -> list[RoomResult | TourgenError]:
     """Build rooms, and write where the time goes."""
     require_profiler()
     with TemporaryDirectory(dir=cache.tour_folder, prefix=".profile-") as folder:
-        outcomes = build_rooms(recipes, cache, here, listener, Path(folder))
+        outcomes = build_rooms(recipes, cache, crew, listener, Path(folder))
         files = sorted(Path(folder).iterdir())
         if files:
             write_flame_graph(files, page)

@@ -76,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
     add("clean", _clean, "Drop the cache of a tour.", "DIR")
     doctor = add("doctor", _doctor, "Say what this machine lacks, and how to mend it.", "")
     build.add_argument(
-        "-o", "--output", type=Path, metavar="OUT", help="the site's folder (DIR/site)"
+        "-o", "--output", metavar="OUT", help="the site's folder (DIR/site), or an address"
     )
     build.add_argument(
         "--room", action="append", default=[], metavar="ID", help="build only this room; repeatable"
@@ -165,7 +165,7 @@ def _plan(asked: argparse.Namespace) -> int:
 def _build(asked: argparse.Namespace) -> int:
     from tourgen.unchanged import last_report
 
-    out = asked.output or asked.folder / OUTPUT
+    out = asked.output or str(asked.folder / OUTPUT)
     report = last_report(asked.folder, out) or _built(asked, out)
     if asked.json:
         _print_json(report)
@@ -178,11 +178,12 @@ def _build(asked: argparse.Namespace) -> int:
         f"{report['ran_stages']} stages run, {report['cached_stages']} from the cache, "
         f"{report['seconds']:.1f} s"
     )
-    print(f"to walk through it: tourgen serve {asked.folder if not asked.output else out}")
+    if "://" not in out:
+        print(f"to walk through it: tourgen serve {out if asked.output else asked.folder}")
     return 0
 
 
-def _built(asked: argparse.Namespace, out: Path) -> Any:
+def _built(asked: argparse.Namespace, out: str) -> Any:
     """Build, and report."""
     limit_native_threads()  # before anything loads such libraries
     from tourgen.build import build_tour

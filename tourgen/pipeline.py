@@ -18,6 +18,7 @@ from tourgen.expected import stage_of
 from tourgen.fitting import picture, points, surface
 from tourgen.geometry import View
 from tourgen.progress import Listener, Started
+from tourgen.remote import local
 from tourgen.scheduler import RoomTasks, run_missing
 from tourgen.stages import (
     bake,
@@ -88,12 +89,12 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         digests: Of the scans' contents, by path.
     """
     detail_mm = room.surface.detail_mm
-    stamps = {each.file: stamp_of(folder / each.file) for each in room.scans}
+    stamps = {each.file: stamp_of(local(folder, each.file)) for each in room.scans}
     scanned = task(
         "scan",
         partial(points.read, room, folder, stamps),
         settings=points.reading(room),
-        digests=tuple(digests[folder / each.file] for each in room.scans),
+        digests=tuple(digests[local(folder, each.file)] for each in room.scans),
         version=3,
         libraries=("pye57",),
     )
@@ -158,7 +159,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
             partial(surface.mended, room, folder),
             sifted,
             settings=surface.Mended(room.mesh, room.unit, room.up),
-            digests=(digests[folder / room.mesh],),
+            digests=(digests[local(folder, room.mesh)],),
             version=1,
             libraries=("numba", "trimesh"),
         )
@@ -348,7 +349,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         files,
         version=4,
     )
-    scan_mb = sum((folder / each.file).stat().st_size for each in room.scans) / 1e6
+    scan_mb = sum(local(folder, each.file).stat().st_size for each in room.scans) / 1e6
     return RoomRecipe(room, scan_mb, files, pictured, entered, measured, summary)
 
 
@@ -379,8 +380,8 @@ class RoomResult:
 
 def sources(tour: Tour) -> list[Path]:
     """The scans of a tour, and the meshes that were mended elsewhere."""
-    files = [tour.folder / scan.file for room in tour.rooms for scan in room.scans]
-    return files + [tour.folder / room.mesh for room in tour.rooms if room.mesh]
+    files = [local(tour.folder, scan.file) for room in tour.rooms for scan in room.scans]
+    return files + [local(tour.folder, room.mesh) for room in tour.rooms if room.mesh]
 
 
 def tour_recipes(tour: Tour, cache: Cache) -> tuple[RoomRecipe, ...]:

@@ -24,6 +24,7 @@ from markdown_it import MarkdownIt
 from tourgen.errors import InputError, MissingTool
 from tourgen.geometry import Float64, View
 from tourgen.headers import headers_file
+from tourgen.remote import local
 from tourgen.tour import Room, Tour
 
 FORMAT: Final = 1
@@ -161,7 +162,9 @@ def _write_all(tour: Tour, built: Mapping[str, BuiltRoom], report: Json, out: Pa
             _write_bytes(folder / PurePosixPath(name), content)
         for note, described_note in zip(room.notes, described_room["notes"], strict=True):
             if note.image:
-                _write_bytes(out / described_note["image"], (tour.folder / note.image).read_bytes())
+                _write_bytes(
+                    out / described_note["image"], local(tour.folder, note.image).read_bytes()
+                )
         page = _page("room.html", shared, described_room, site="../../", is_start=False)
         (folder / "index.html").write_text(page, "utf-8")
     start = next(room for room in rooms if room["id"] == tour.start)
@@ -211,7 +214,7 @@ def _room_json(room: Room, built: BuiltRoom, folder: Path) -> Json:
         "id": room.id,
         "title": dict(room.title),
         "text": {
-            language: _html((folder / name).read_text("utf-8-sig"))
+            language: _html(local(folder, name).read_text("utf-8-sig"))
             for language, name in room.text.items()
         },
         "tileset": f"{home}/tileset.json",

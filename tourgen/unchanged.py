@@ -23,7 +23,7 @@ def remember_build(folder: Path, out: Path, outside: Iterable[Path]) -> None:
     Args:
         folder: The tour's.
         out: The site's.
-        outside: Files that it read from elsewhere.
+        outside: Files that it read from elsewhere on this machine.
     """
     outer = [str(file.resolve()) for file in outside]
     note = {"out": str(out.resolve()), "outside": outer, "files": _state(folder, out, outer)}
@@ -32,15 +32,20 @@ def remember_build(folder: Path, out: Path, outside: Iterable[Path]) -> None:
     aside.replace(folder / _NOTE)
 
 
-def last_report(folder: Path, out: Path) -> dict[str, Any] | None:
+def forget_build(folder: Path) -> None:
+    """Have the next build look: what it read or sent lies where nothing tells of a change."""
+    (folder / _NOTE).unlink(missing_ok=True)
+
+
+def last_report(folder: Path, out: str) -> dict[str, Any] | None:
     """The report of the last build, of which every stage is in the cache; None: build again."""
     try:
         note = json.loads((folder / _NOTE).read_text(encoding="utf-8"))
-        if note["out"] != str(out.resolve()):
+        if note["out"] != str(Path(out).resolve()):
             return None
-        if note["files"] != _state(folder, out, note["outside"]):
+        if note["files"] != _state(folder, Path(out), note["outside"]):
             return None
-        report: dict[str, Any] = json.loads((out / "report.json").read_text(encoding="utf-8"))
+        report: dict[str, Any] = json.loads((Path(out) / "report.json").read_text(encoding="utf-8"))
     except (OSError, ValueError, KeyError):
         return None
     report["cached_stages"] += report["ran_stages"]

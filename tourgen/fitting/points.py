@@ -17,6 +17,7 @@ from tourgen.errors import InputError
 from tourgen.fitting.lengths import Corner, corners, detail_m
 from tourgen.fitting.plausible import require_room
 from tourgen.geometry import Float64, OrientedCloud, Panorama, PointCloud
+from tourgen.remote import local
 from tourgen.scans import ReadFacts, read_panoramas, read_room, without_repeats
 from tourgen.stages import exposure, floor, normals, ownership, register, sift, stations, thin
 from tourgen.stages.spacing import Spacing, spacing
@@ -123,8 +124,8 @@ def read(room: Room, folder: Path, stamps: Mapping[str, str], _: Reading) -> Roo
 
 def _require_unchanged(folder: Path, stamps: Mapping[str, str]) -> None:
     for file, stamp in stamps.items():
-        there = (folder / file).exists()
-        if not there or stamp_of(folder / file) != stamp:
+        there = local(folder, file).exists()
+        if not there or stamp_of(local(folder, file)) != stamp:
             raise InputError(
                 f"scan `{file}`: expected it as it was when the build began, "
                 f"found it {'changed' if there else 'gone'}",

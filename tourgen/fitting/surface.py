@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from tourgen.errors import InputError
 from tourgen.fitting.lengths import Corner, corners, detail_m, support_m
 from tourgen.geometry import Float64, Mesh, OrientedCloud
+from tourgen.remote import local
 from tourgen.scans import Frame, read_mesh
 from tourgen.stages import inferred, levels, measure, register, trim
 from tourgen.stages.mesh_arrays import vertex_normals
@@ -196,7 +197,7 @@ def mended(room: Room, folder: Path, kept: Sifted, asked: Mended) -> Drawn:
         InputError: It is no mesh, or lies elsewhere than the scan.
     """
     frame, cloud = Frame.of(room.unit_m, room.up), kept.cloud
-    mesh = read_mesh(folder / asked.file, asked.file, frame, cloud.origin)
+    mesh = read_mesh(local(folder, asked.file), asked.file, frame, cloud.origin)
     sample = cloud.points[:: max(1, len(cloud) // _SAMPLE)]
     away, _ = cKDTree(mesh.vertices[mesh.faces].mean(axis=1)).query(sample, workers=-1)
     off_m = float(np.median(away))

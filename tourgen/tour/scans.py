@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from tourgen.errors import Faults, InputError
+from tourgen.remote import local
 from tourgen.scans import Scan, open_scan
 from tourgen.tour.tables import Room, ScanRef, Tour
 
@@ -67,7 +68,7 @@ def check_headers(
 
 def _open(room: Room, scan: ScanRef, folder: Path) -> Scan:
     return open_scan(
-        folder / scan.file,
+        local(folder, scan.file),
         room.unit_m,
         room.up,
         name=scan.file,

@@ -85,7 +85,9 @@ class Viewpoint(_Table):
 class ScanRef(_Table):
     """A scan of a room: a file name, or a table."""
 
-    file: File = Field(description="The scan: `.ply` or `.e57`.")
+    file: File = Field(
+        description="The scan: `.ply` or `.e57`, or the address of one that fsspec opens, as `s3://`."
+    )
     pose: Pose | None = Field(
         default=None,
         description="Rotation and shift, four rows of four numbers, that carry this scan's "

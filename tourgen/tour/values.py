@@ -20,6 +20,9 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import PydanticCustomError, core_schema
 
+from tourgen.errors import TourgenError
+from tourgen.remote import fetch, is_remote, local
+
 _ROOM_ID: Final = re.compile(r"(?!(con|prn|aux|nul|com\d|lpt\d)$)[a-z0-9][a-z0-9_-]{0,63}")
 _LANGUAGE: Final = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{2,8})*")
 
@@ -143,7 +146,12 @@ def _check_radii(radii: tuple[float, ...]) -> tuple[float, ...]:
 def _check_file(name: str, info: ValidationInfo) -> str:
     if info.context is None:
         return name
-    path = info.context.folder / name
+    if is_remote(name):
+        try:
+            fetch(info.context.folder, name)
+        except TourgenError as error:
+            raise fault(error.message, error.hint) from None
+    path = local(info.context.folder, name)
     # of os.path, which holds names that no system can have for missing files
     if not os.path.isfile(path):
         beside = os.listdir(path.parent) if os.path.isdir(path.parent) else ()
