@@ -15,6 +15,7 @@ help:
 	@echo "make lint        ruff, mypy and the viewer's types"
 	@echo "make bench       accuracy of the demo against its ground truth"
 	@echo "make bench-fidelity   every method and its peers against it (BENCH='--room chamber1')"
+	@echo "make bench-speed      time and memory beside what one does by hand (BENCH='--points 1300000')"
 	@echo "make soak        a build killed at 30 moments, which takes half an hour"
 	@echo "make pictures    screenshots of the demo for README and docs"
 	@echo "make lock        pin the newest versions, with their hashes"
@@ -115,6 +116,11 @@ bench: demo
 bench-fidelity: demo system-bench $(VENV)/.bench
 	$(BIN)/python tests/peers/fidelity.py $(DEMO) --gallery ../shared/scans/gallery_sim \
 		--write docs/benchmarks.md $(BENCH)
+
+# Alone on the machine: what else runs is timed too.
+.PHONY: bench-speed
+bench-speed: demo system-bench $(VENV)/.bench
+	$(BIN)/python tests/peers/speed.py --demo $(DEMO) --write docs/benchmarks.md $(BENCH)
 
 # ---- What is kept up
 

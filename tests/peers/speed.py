@@ -1,0 +1,156 @@
+"""How long a room takes, and how much memory: ``python tests/peers/speed.py [--points N ...]``.
+
+Whole processes, one after the other in one run: ``tourgen build`` without a cache, and the chains
+that are made by hand (``by_hand``), of the demo's first chamber scanned to each number of points.
+The chains solve at the depth that gives the detail which tourgen chose, and end with as many faces;
+beside the time stands how true each is, so that nobody wins by doing less.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from score import Truth, load
+from sections import rewrite
+from surface_score import Reference, Samples, surface_figures
+from usage import Usage, measured
+
+from tourgen.fitting.lengths import detail_m
+from tourgen.geometry import PointCloud
+from tourgen.simulate import MODELS, Size, simulate_room
+from tourgen.stages.spacing import spacing
+from tourgen.stages.surface.poisson import octree_depth
+
+ROOM = "chamber1"
+POINTS = (130_000, 1_300_000, 15_200_000)
+MOST_S, MOST_MB = 3600.0, 20_000.0
+CHAINS = ("meshlab", "open3d")
+HEADING = "Time and memory"
+AROUND_M = 0.1
+PREAMBLE = """Made by `make bench-speed`: whole processes in one run, without a cache. `meshlab`
+and `open3d` are what one does by hand (`tests/peers/by_hand.py`): crop, normals, screened Poisson
+at the depth that gives the detail which tourgen chose, cut, quadric decimation to as many faces,
+UVs (trivial; xatlas on the whole mesh), colours to a texture of 4096 pixels, export. tourgen also
+cleans, registers, closes gaps, opens windows and packs all levels of detail. `times`: wall time
+over tourgen's. Memory is the sum over processes of proportional memory. F-score at 5 mm and the
+95th percentile of the distance to the truth tell that nobody wins by doing less.
+"""
+
+
+def main() -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--points", type=int, action="append", help="of the scan; repeatable")
+    parser.add_argument(
+        "--chain", action="append", choices=CHAINS, help="only this one; repeatable"
+    )
+    parser.add_argument("--scratch", type=Path, default=Path("build/speed"))
+    parser.add_argument("--demo", type=Path, default=Path("sites/lighthouse"))
+    parser.add_argument("--write", type=Path, help="write the section of this Markdown file")
+    given = parser.parse_args()
+    rows = []
+    for points in given.points or POINTS:
+        rows += compared(points, given)
+        print(markdown(rows), flush=True)
+        if given.write:
+            rewrite(given.write, HEADING, f"{PREAMBLE}\n{markdown(rows)}")
+    return 0
+
+
+def compared(points: int, given: argparse.Namespace) -> list[dict[str, Any]]:
+    """A row for tourgen and for each chain."""
+    tour = given.scratch.resolve() / f"{points}"
+    _scanned(points, tour, given.demo)
+    truth = Truth(tour / "truth", ROOM)
+    reference = Reference.of(truth)
+    shutil.rmtree(tour / ".tourgen", ignore_errors=True)
+    shutil.rmtree(tour / "site", ignore_errors=True)
+
+    def row(name: str, usage: Usage, mesh: Path) -> dict[str, Any]:
+        print(f"{points}: {name}: {usage.wall_s:.0f} s, {usage.peak_mb:.0f} MB", flush=True)
+        told: dict[str, Any] = {"points": points, "program": name, "usage": usage}
+        if not usage.failed:
+            found = load(mesh)
+            told |= surface_figures(*found, Samples.of(*found, truth), reference)
+        return told
+
+    def run(name: str, *command: str) -> Usage:
+        log = tour / f"{name}.log"
+        return measured([sys.executable, *command], most_s=MOST_S, most_mb=MOST_MB, log=log)
+
+    site = tour / "site/rooms" / ROOM
+    rows = [row("tourgen", run("tourgen", "-m", "tourgen.cli", "build", str(tour)), site)]
+    report = json.loads((tour / "site/report.json").read_text("utf-8"))["rooms"][ROOM]
+    eye = truth.stations[0]
+    low, high = truth.vertices.min(axis=0) - AROUND_M, truth.vertices.max(axis=0) + AROUND_M
+    for chain in given.chain or CHAINS:
+        out = tour / chain
+        shutil.rmtree(out, ignore_errors=True)
+        told = [*map(str, (*low, *high))]
+        command = [str(Path(__file__).with_name("by_hand.py")), chain]
+        command += [str(tour / "scans" / f"{ROOM}.ply"), str(out), "--box", *told]
+        command += ["--eye", *map(str, eye), "--depth", str(_depth(tour, low, high))]
+        command += ["--faces", str(report["faces"][-1])]
+        rows.append(row(chain, run(chain, *command), out / "mesh.ply"))
+    return rows
+
+
+def _scanned(points: int, tour: Path, demo: Path) -> None:
+    """A tour of the room alone, scanned to a number of points."""
+    if (tour / "tour.toml").exists():
+        return
+    told = tomllib.loads((demo / "tour.toml").read_text("utf-8"))
+    (room,) = (each for each in told["room"] if each["id"] == ROOM)
+    closed = ", ".join(f"{{ min = {box['min']}, max = {box['max']} }}" for box in room["closed"])
+    tour.mkdir(parents=True, exist_ok=True)
+    simulate_room(MODELS[ROOM](), tour, Size(points=points, e57=False))
+    (tour / "tour.toml").write_text(
+        f'[tour]\ntitle = "Speed"\n\n[[room]]\nid = "{ROOM}"\n'
+        f'scans = ["scans/{ROOM}.ply"]\nclosed = [{closed}]\n',
+        encoding="utf-8",
+    )
+
+
+def _depth(tour: Path, low: Any, high: Any) -> int:
+    """Of the octree whose cells are as fine as the detail that tourgen chooses."""
+    import open3d as o3d
+
+    points = np.asarray(o3d.io.read_point_cloud(str(tour / f"scans/{ROOM}.ply")).points, np.float32)
+    points = points[((points > low) & (points < high)).all(axis=1)]
+    nothing = np.zeros((len(points), 3), np.uint8)
+    cloud = PointCloud(np.zeros(3), points, nothing, np.full(len(points), -1, np.int16))
+    return octree_depth(points, detail_m(spacing(cloud), None))
+
+
+def markdown(rows: list[dict[str, Any]]) -> str:
+    """One line a run."""
+    lines = [
+        "| points | program | s | times | processor s | peak MB | faces | F 5 mm | p95 mm |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    ours = {each["points"]: each["usage"].wall_s for each in rows if each["program"] == "tourgen"}
+    for each in rows:
+        usage = each["usage"]
+        start = f"| {each['points']:,} | {each['program']} "
+        if usage.failed:
+            lines.append(
+                f"{start}| {usage.failed.splitlines()[0]} | | | {usage.peak_mb:,.0f} | | | |"
+            )
+            continue
+        lines.append(
+            f"{start}| {usage.wall_s:.0f} | {usage.wall_s / ours[each['points']]:.2f} "
+            f"| {usage.processor_s:.0f} | {usage.peak_mb:,.0f} | {each['faces']:,} "
+            f"| {each['f_score_5mm']:.3f} | {each['accuracy_p95_mm']:.2f} |"
+        )
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
