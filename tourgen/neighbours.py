@@ -27,6 +27,8 @@ _SHELLS = 4
 """Of cells; farther off, bricks are looked at as a whole."""
 _PART = 1 << 14
 _SAMPLE = 4096
+_FEW = 12
+"""Neighbours for which cells are made at least: smaller ones take memory, and save nothing."""
 _POINTS_IN_REACH = 3.2
 """Neighbours looked for over those that a cell should hold, on a surface."""
 
@@ -114,7 +116,7 @@ def _cell_m(points: Float32, count: int) -> np.float32:
     apart = cKDTree(chosen).query(chosen, k=[min(5, len(chosen))])[0]
     # A sample of a share s lies 1 / sqrt(s) as far apart on a surface.
     spacing = float(np.median(apart)) * np.sqrt(np.pi / 4 * len(chosen) / len(points))
-    return np.float32(max(spacing * np.sqrt(max(count, 4) / _POINTS_IN_REACH), 1e-6))
+    return np.float32(max(spacing * np.sqrt(max(count, _FEW) / _POINTS_IN_REACH), 1e-6))
 
 
 @compiled

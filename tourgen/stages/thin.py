@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from tourgen.compiled import compiled
 from tourgen.geometry import Float32, PointCloud
+from tourgen.sorting import order_of
 
 VERSION = 2
-_AXIS_BITS = 21
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +60,35 @@ def voxel_groups(
     Returns:
         ``order`` (n,), positions sorted by voxel, and ``starts`` (v,), where each voxel begins.
     """
-    cell = np.floor((points - points.min(axis=0)) / voxel_m).astype(np.int64)
-    key = (cell[:, 0] << 2 * _AXIS_BITS) | (cell[:, 1] << _AXIS_BITS) | cell[:, 2]
-    order = np.argsort(key, kind="stable")
-    key = key[order]
-    starts = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
-    return order, starts
+    low = points.min(axis=0)
+    key = _cells(points, low, np.float32(voxel_m), points.max(axis=0))
+    order = order_of(key)
+    return order, _starts(key, order)
+
+
+@compiled
+def _cells(
+    points: Float32, low: Float32, voxel_m: np.float32, high: Float32
+) -> npt.NDArray[np.int64]:
+    """(n,) number of each point's voxel, by x, then y, then z."""
+    columns = np.int64((high[1] - low[1]) / voxel_m) + 1
+    layers = np.int64((high[2] - low[2]) / voxel_m) + 1
+    key = np.empty(len(points), np.int64)
+    for i in range(len(points)):
+        x = np.int64((points[i, 0] - low[0]) / voxel_m)
+        y = np.int64((points[i, 1] - low[1]) / voxel_m)
+        z = np.int64((points[i, 2] - low[2]) / voxel_m)
+        key[i] = (x * columns + y) * layers + z
+    return key
+
+
+@compiled
+def _starts(key: npt.NDArray[np.int64], order: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Where in the order a voxel begins."""
+    found = np.empty(len(order), np.int64)
+    count = 0
+    for i in range(len(order)):
+        if i == 0 or key[order[i]] != key[order[i - 1]]:
+            found[count] = i
+            count += 1
+    return found[:count].copy()
