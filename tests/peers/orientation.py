@@ -41,6 +41,8 @@ from tourgen.tour import Room, load_tour, open_scans
 GOAL_RIGHT, GOAL_SECONDS_A_MILLION = 0.995, 10.0
 SAMPLE = 150_000
 SETTINGS = normals.Settings()
+NEAR_M = 0.01
+"""So near a point lies to the true one that it stands for."""
 BANDS_MM = ((0, 5), (5, 10), (10, 20), (20, 30))
 Bools = NDArray[np.bool_]
 
@@ -136,8 +138,10 @@ def right(points: Float32, found: Float32, truth: Truth) -> float:
 
 def _matched(points: Float32, truth: Truth) -> tuple[NDArray[np.int64], Float32]:
     """Which points the truth knows, and their true normals."""
-    away, nearest = map(np.asarray, cKDTree(truth.points).query(points, workers=-1))
-    mine = np.flatnonzero(away < 0.01)
+    away, nearest = map(
+        np.asarray, cKDTree(truth.points).query(points, distance_upper_bound=NEAR_M, workers=-1)
+    )
+    mine = np.flatnonzero(np.isfinite(away))
     return mine, truth.normals[nearest[mine]]
 
 
