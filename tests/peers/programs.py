@@ -28,9 +28,9 @@ from tourgen.geometry import Float32, Float64, Int32
 
 VERSION = 2
 """Raised when a recipe changes, so that cached meshes are made again."""
-LIMIT_S, LIMIT_S_A_MILLION = 900, 120
-"""A peer that takes more of the processor, thrice what a whole tour takes us, or two minutes for a
-million points, is stopped, and the table says so."""
+LIMIT_S = 900
+"""A peer that takes more of the processor, thrice what a whole tour takes us, or a minute for a
+million points of the largest room, is stopped, and the table says so."""
 
 Mesh = tuple[Float64, Int32]
 
@@ -214,16 +214,11 @@ def made(attempt: Attempt, room: BenchRoom, scratch: Path) -> Path | str:
         return why.read_text(encoding="utf-8")
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
-        failed = apart(_make, attempt, room, file, limit_s=_limit_s(room))
+        failed = apart(_make, attempt, room, file, limit_s=LIMIT_S)
         if failed:
             why.write_text(failed, encoding="utf-8")
             return failed
     return file
-
-
-def _limit_s(room: BenchRoom) -> int:
-    """How much of the processor a peer may take."""
-    return max(LIMIT_S, int(LIMIT_S_A_MILLION * len(room.cropped()) / 1e6))
 
 
 def _make(attempt: Attempt, room: BenchRoom, file: Path) -> None:
