@@ -166,7 +166,8 @@ def _build(asked: argparse.Namespace) -> int:
     from tourgen.unchanged import last_report
 
     out = asked.output or str(asked.folder / OUTPUT)
-    report = last_report(asked.folder, out) or _built(asked, out)
+    plain = not (asked.room or asked.cluster or asked.profile)
+    report = (plain and last_report(asked.folder, out)) or _built(asked, out)
     if asked.json:
         _print_json(report)
         return 0

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import reduce
+from importlib.util import find_spec
 from pathlib import Path
 
 from tourgen.errors import MissingTool
@@ -22,13 +23,11 @@ def require_profiler() -> None:
     Raises:
         MissingTool: It is not.
     """
-    try:
-        import pyinstrument  # noqa: F401
-    except ImportError:
+    if find_spec("pyinstrument") is None:
         raise MissingTool(
             "--profile: expected pyinstrument, found none",
             'python3 -m pip install "tourgen[profile]"',
-        ) from None
+        )
 
 
 @contextmanager

@@ -2,7 +2,8 @@
 
 To find out which stages must run takes every stage's settings and version, and so their libraries,
 seconds before anything is known. So a build notes the size and time of change of every file that it
-may have looked at, and of those that it published; while they are the same, there is nothing to do.
+may have looked at, of those that it published and of the program; while they are the same, there is
+nothing to do.
 """
 
 from __future__ import annotations
@@ -11,10 +12,13 @@ import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from sysconfig import get_path
 from typing import Any
 
 _NOTE = Path(".tourgen") / "built.json"
 _PACKAGE = Path(__file__).parent
+_PROGRAM = (_PACKAGE, _PACKAGE.parent / "templates", _PACKAGE.parent / "static" / "dist")
+"""What pages are made by; in an installed package the first holds the others."""
 
 
 def remember_build(folder: Path, out: Path, outside: Iterable[Path]) -> None:
@@ -58,10 +62,16 @@ def last_report(folder: Path, out: str) -> dict[str, Any] | None:
 def _state(folder: Path, out: Path, outside: Iterable[str]) -> dict[str, list[int]]:
     """Size and time of change of all files by path."""
     found: dict[str, list[int]] = {}
-    for root in (folder, out, _PACKAGE, *map(Path, outside)):
+    for root in (folder, out, *_PROGRAM, *map(Path, outside)):
         for file in _files(root.resolve()):
-            about = file.stat()
+            about = file.lstat()  # a link may lead to nothing
             found[str(file)] = [about.st_size, about.st_mtime_ns]
+            if file.is_symlink() and file.exists():
+                about = file.stat()
+                found[f"{file} ->"] = [about.st_size, about.st_mtime_ns]
+    # Installing another version of a library touches the folder that holds it.
+    libraries = Path(get_path("purelib"))
+    found[str(libraries)] = [0, libraries.stat().st_mtime_ns]
     return found
 
 

@@ -192,6 +192,17 @@ def test_only_an_untouched_tour_is_told_at_once(
     assert published_files(box_copy / "site") == before
 
 
+def test_what_is_asked_of_an_untouched_tour_is_still_done(
+    box_copy: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told(capsys, "build", str(box_copy))
+    assert main(["build", str(box_copy), "--room", "attic"]) == 2
+    assert "attic" in capsys.readouterr().err
+    (box_copy / "lost.md").symlink_to(box_copy / "nowhere.md")
+    assert told(capsys, "build", str(box_copy))["ran_stages"] == 0, "a link to nothing is no fault"
+    assert last_report(box_copy, str(box_copy / "site"))
+
+
 def test_a_disk_that_fills_is_one_clear_line(box_copy: Path, tmp_path: Path) -> None:
     """On a file system of its own, too small for the cache; with room, the build goes on."""
     before = published_files(box_copy / "site")
