@@ -8,11 +8,13 @@ SPLIT = " part "
 #: Seconds a megabyte of scan, as the demo's rooms of 13 to 23 MB took on one core; 0.02 for a
 #: stage not named.
 _SECONDS = {
-    "ownership": 0.5, "register": 0.4, "sift": 0.3, "exposure": 0.1, "spacing": 0.05,
-    "normals": 0.3, "surface": 1.6, "trim": 0.5, "hygiene": 0.25, "levels": 0.2, "tiles": 0.05,
-    "unwrap": 0.7, "floors": 0.25, "colors": 0.25, "bake": 0.4, "inferred": 0.1, "pack": 0.1,
-    "poster": 0.1, "measure": 0.15,
+    "ownership": 0.3, "register": 0.28, "sift": 0.24, "exposure": 0.14, "spacing": 0.02,
+    "normals": 0.27, "surface": 1.15, "trim": 0.28, "hygiene": 0.1, "levels": 0.18, "tiles": 0.04,
+    "unwrap": 0.55, "floors": 0.19, "colors": 0.12, "bake": 0.45, "inferred": 0.05, "pack": 0.07,
+    "poster": 0.1, "measure": 0.08,
 }  # fmt: skip
+#: Stages that leave cores idle: most of their work is of the kind that one thread must do.
+_ON_ONE_CORE = {"surface", "trim", "hygiene", "levels"}
 #: Peak megabytes a megabyte of scan, beyond those of a process at rest: a room of 228 MB.
 _MEMORY = {"sift": 15, "surface": 30, "trim": 16, "colors": 20, "exposure": 10}
 _REST_MB = 300
@@ -27,6 +29,11 @@ def parts_of(name: str) -> int:
     """Into how many tasks its stage is split."""
     _, _, part = name.partition(SPLIT)
     return int(part.split("/")[1]) if part else 1
+
+
+def leaves_cores(name: str) -> bool:
+    """Whether a task, whatever it is given, mostly works on one core."""
+    return stage_of(name) in _ON_ONE_CORE
 
 
 def expected_s(name: str, scan_mb: float) -> float:

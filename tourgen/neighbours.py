@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from tourgen.compiled import compiled
+from tourgen.extent import extent
 from tourgen.geometry import Float32, Float64, Int32
 from tourgen.threads import in_parts
 
@@ -92,9 +93,7 @@ class Neighbours:
 
 
 def _sorted(points: Float32, count: int) -> Grid:
-    low, high = (
-        (points.min(axis=0), points.max(axis=0)) if len(points) else np.zeros((2, 3), np.float32)
-    )
+    low, high = extent(points) if len(points) else np.zeros((2, 3), np.float32)
     cell_m = _cell_m(points, count)
     while np.prod(_shape(low, high, cell_m), dtype=np.float64) > _MOST_BRICKS:
         cell_m *= np.float32(1.25)

@@ -2,8 +2,9 @@
 
 Of the tasks that can run, the one with most work behind it goes first. A task gets all threads
 that are free unless others wait for them too, and starts only where memory is left for what it is
-expected to take. A worker that dies costs a retry; a room that fails is told and does not stop the
-others.
+expected to take. What little depends on waits, rather than take threads from a stage that uses
+them, for one that is about to leave cores idle. A worker that dies costs a retry; a room that fails
+is told and does not stop the others.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any
 
 from tourgen.cache import Cache
 from tourgen.errors import StageError, TourgenError
-from tourgen.expected import expected_mb, expected_s
+from tourgen.expected import expected_mb, expected_s, leaves_cores
 from tourgen.memory import available_mb
 from tourgen.tasks import Job, Task, in_order, missing_tasks, run_job
 from tourgen.workers import Workers
@@ -50,6 +51,7 @@ class _Waiting:
         task: It.
         rooms: Those that need it.
         behind_s: Seconds that it and the longest chain of tasks after it take.
+        needs_s: Seconds that it takes.
         needs_mb: Memory.
         tries: How often a worker died of it.
     """
@@ -57,6 +59,7 @@ class _Waiting:
     task: Task[Any]
     rooms: list[str]
     behind_s: float
+    needs_s: float
     needs_mb: float
     tries: int = 0
 
@@ -120,8 +123,9 @@ class _Schedule:
             if each.key in self._waiting:
                 self._waiting[each.key].rooms.append(room)
             elif each.key not in self._keys_running():
-                needs_mb = expected_mb(each.name, scan_mb)
-                self._waiting[each.key] = _Waiting(each, [room], behind[each.key], needs_mb)
+                needs_s, needs_mb = (of(each.name, scan_mb) for of in (expected_s, expected_mb))
+                waiting = _Waiting(each, [room], behind[each.key], needs_s, needs_mb)
+                self._waiting[each.key] = waiting
 
     def _keys_running(self) -> set[str]:
         return {waiting.task.key for waiting, _ in self._running.values()}
@@ -139,13 +143,15 @@ class _Schedule:
     def _start(self) -> bool:
         """Start what can start; whether anything did."""
         started = False
-        while ready := self._ready():
+        while ready := [each for each in self._ready() if self._fits(each)]:
             slots = self.workers.most - len(self._running)
-            free = self.workers.threads - sum(threads for _, threads in self._running.values())
-            chosen = next((each for each in ready if self._fits(each)), None)
-            if slots < 1 or free < 1 or chosen is None:
+            free = self.workers.threads - sum(map(_used, self._running.values()))
+            due = [each for each in ready if self._is_due(each, ready[0])]
+            if slots < 1 or free < 1 or not due:
                 break
-            share = max(1, free // min(slots, len(ready)))
+            chosen = due[0]
+            alone = leaves_cores(chosen.task.name)
+            share = free if alone else max(1, free // min(slots, len(due)))
             del self._waiting[chosen.task.key]
             for room in chosen.rooms:
                 self.announce(room, chosen.task.name, self._ahead(room, chosen))
@@ -163,6 +169,26 @@ class _Schedule:
             return False
         left = available_mb()
         return left is None or each.needs_mb < left
+
+    def _is_due(self, each: _Waiting, first: _Waiting) -> bool:
+        """Whether a task need not wait for one as long that will leave a core to it.
+
+        Args:
+            each: That could start.
+            first: Of all that could, the one with most behind it.
+        """
+        if each is first and not self._running:
+            return True
+        before = [other for other, _ in self._running.values()]
+        if any(leaves_cores(other.task.name) for other in (*before, first)):
+            return True
+        return not any(
+            leaves_cores(other.task.name)
+            and other.behind_s > each.behind_s
+            and other.needs_s > each.needs_s
+            and set(other.rooms) & set(each.rooms)
+            for other in self._waiting.values()
+        )
 
     def _ahead(self, room: str, chosen: _Waiting) -> tuple[str, ...]:
         left = (each.task.name for each in self._waiting.values() if room in each.rooms)
@@ -206,6 +232,12 @@ class _Schedule:
             each.rooms = [other for other in each.rooms if other != room]
             if not each.rooms:
                 del self._waiting[key]
+
+
+def _used(running: tuple[_Waiting, int]) -> int:
+    """Threads that a running task keeps busy of those it got."""
+    each, threads = running
+    return 1 if leaves_cores(each.task.name) else threads
 
 
 def _told(room: str, stage: str, error: BaseException) -> TourgenError:

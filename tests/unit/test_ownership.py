@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tourgen.stages.ownership import Settings, ownership
-from tourgen.stages.thin import voxel_groups
+from tourgen.voxels import voxel_groups
 
 PLACES = np.array([[-1.2, -0.6, 1.5], [1.1, 0.7, 1.6]])
 OFF = np.array([[0.03, -0.02, 0.06], [-0.02, 0.03, -0.05]])

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from tourgen.errors import InputError
 from tourgen.geometry import OrientedCloud, PointCloud
 from tourgen.stages import floor, free_space, normals, sift, sight, spacing, stations, thin
+from tourgen.voxels import voxel_groups
 
 ROOM_M = np.array([4.0, 5.0, 2.6])
 
@@ -94,7 +95,7 @@ def test_one_point_a_voxel_and_their_mean_stays(voxel_m: float, seed: int) -> No
     cells = np.floor((np.float32(points) - low) / voxel_m).astype(int)
     expected, count = np.unique(cells, axis=0, return_counts=True)
     assert len(thinned) == len(expected)
-    order, starts = thin.voxel_groups(np.float32(points), voxel_m)
+    order, starts = voxel_groups(np.float32(points), voxel_m)
     weight = np.diff(np.append(starts, len(order)))
     assert sorted(weight) == sorted(count)
     mean = (thinned.points * weight[:, None]).sum(axis=0) / weight.sum()

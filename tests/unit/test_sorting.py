@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tourgen.sorting import order_of
-from tourgen.stages.thin import voxel_groups
+from tourgen.voxels import voxel_groups
 
 
 @settings(deadline=None)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.errors import InputError
+from tourgen.extent import extent
 from tourgen.geometry import Float64, Panorama, PointCloud
 from tourgen.scans.scan import Chunk, Scan
 
@@ -100,7 +101,7 @@ def _spanned(bounds: Float64, points: Float64) -> Float64:
     """Bounds wide enough for more points."""
     if not len(points):
         return bounds
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = extent(points)
     return np.array([np.fmin(bounds[0], low), np.fmax(bounds[1], high)])
 
 

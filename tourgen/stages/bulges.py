@@ -96,7 +96,7 @@ def _mean_of_neighbours(mesh: Mesh, at: Int64) -> csr_array:
     """(k, v) what takes vertices to the mean of the neighbours of each chosen one."""
     row = np.full(len(mesh.vertices), -1)
     row[at] = np.arange(len(at))
-    edge = edges(mesh.faces)
+    edge = edges(mesh.faces[(row[mesh.faces] >= 0).any(axis=1)])
     edge = np.concatenate([edge, edge[:, ::-1]])
     edge = edge[row[edge[:, 0]] >= 0]
     shape = (len(at), len(mesh.vertices))

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.geometry import Float32, Float64
+from tourgen.voxels import grouped, voxels
 
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
@@ -62,11 +63,7 @@ def cells_of(points: Float32, owner: npt.NDArray[np.integer], count: int, cell_m
     if not len(points):
         none = np.zeros(0, np.int64)
         return Cells(none, none, none, none, none)
-    at = np.floor((points - points.min(0)) / cell_m).astype(np.int64)
-    span = at.max(0) + 1
-    key = ((at[:, 0] * span[1] + at[:, 1]) * span[2] + at[:, 2]) * count + owner
-    order = np.argsort(key, kind="stable")
-    key = key[order]
-    starts = np.flatnonzero(np.diff(key, prepend=-1))
-    cell, of = np.divmod(key[starts], count)
+    key = voxels(points, cell_m)[0] * count + owner
+    order, starts = grouped(key)
+    cell, of = np.divmod(key[order[starts]], count)
     return Cells(order, starts, np.diff(starts, append=len(key)), cell, of)

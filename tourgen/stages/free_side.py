@@ -36,7 +36,7 @@ from scipy.spatial import cKDTree
 from tourgen.geometry import Float32, Float64
 from tourgen.rays import ray_scene, rays_of
 from tourgen.stages.tangent import across
-from tourgen.stages.thin import voxel_groups
+from tourgen.voxels import voxel_groups
 
 _PATCHES = 90_000
 _FINEST_M = 0.02

@@ -24,7 +24,9 @@ from tourgen.stages.mesh_arrays import (
     face_areas,
 )
 
-VERSION = 3
+VERSION = 4
+_SUSPECT_M2 = 1e-8
+"""A face without height, to trimesh 10 nm, is smaller than this if it is no metre long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +52,10 @@ def hygiene(mesh: Mesh, settings: Settings) -> Mesh:
     """
     import trimesh
 
-    welded = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    keep = welded.nondegenerate_faces() & welded.unique_faces()
+    keep = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).unique_faces()
+    small = np.flatnonzero(face_areas(mesh) < _SUSPECT_M2)
+    suspects = trimesh.Trimesh(mesh.vertices, mesh.faces[small], process=False)
+    keep[small] &= suspects.nondegenerate_faces()
     mesh = _without_overfull_edges(compact(mesh, keep))
     mesh = compact(mesh, _large_enough(mesh, settings))
     if not len(mesh.faces):

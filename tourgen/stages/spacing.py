@@ -8,7 +8,7 @@ import numpy as np
 
 from tourgen.geometry import Float32, PointCloud
 from tourgen.neighbours import Neighbours
-from tourgen.stages.thin import voxel_groups
+from tourgen.voxels import voxel_groups
 
 VERSION = 2
 _SAMPLE = 20_000

@@ -31,6 +31,7 @@ from tourgen.geometry import Float32, OrientedCloud, PointCloud, UInt8
 from tourgen.neighbours import Grid, Neighbours, nearest_to
 from tourgen.stages.bake.texels import Texels, to_bytes, unit
 from tourgen.threads import in_parts
+from tourgen.voxels import grouped, voxels
 
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
@@ -161,12 +162,8 @@ def _averaged(
     points: Float32, kind: Int64, cell_m: float, *values: npt.NDArray[np.generic]
 ) -> tuple[Float32, ...]:
     """The mean of each value over the points of one cell and one kind."""
-    cells = np.floor((points - points.min(0)) / cell_m).astype(np.int64)
-    span = cells.max(0) + 1
-    key = ((cells[:, 0] * span[1] + cells[:, 1]) * span[2] + cells[:, 2]) * 6 + kind
-    order = np.argsort(key, kind="stable")
-    starts = np.flatnonzero(np.diff(key[order], prepend=-1))
-    counts = np.diff(starts, append=len(key)).astype(np.float32)[:, None]
+    order, starts = grouped(voxels(points, cell_m)[0] * 6 + kind)
+    counts = np.diff(starts, append=len(order)).astype(np.float32)[:, None]
     return tuple(
         (np.add.reduceat(value[order].astype(np.float32), starts, axis=0) / counts).astype(
             np.float32

@@ -148,7 +148,7 @@ def _grid(
         return None
     sample = points[rng.permutation(len(points))[: settings.polish_points]]
     sample = sample[np.abs(angles(sample, place)[0]) < HIGHEST_DEG]
-    grids = [polished(grid, sample, settings) for grid, _ in fits]
+    grids = each(lambda fit: polished(fit[0], sample, settings), fits)
     grids = [grid for grid in grids if grid.is_as_fine_as(settings.step_deg)]
     shares = [float((grid.off(sample) < settings.most_off / 4).mean()) for grid in grids]
     best = int(np.argmax(shares)) if shares else -1

@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 from tourgen.geometry import Float32, Float64
 from tourgen.stages.ownership.settings import Settings
 from tourgen.stages.ownership.windows import TURN, Windows, angles
+from tourgen.threads import each
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,16 +67,17 @@ class Grid:
 def fitted(windows: Windows, place: Float64, frequency: float) -> list[tuple[Grid, float]]:
     """The grids that most points may be on, and how well they are: from 0 to 1."""
     elevation, azimuth, _ = angles(windows.points, place)
-    fits = []
-    for sought in _clearest(azimuth, frequency + np.arange(-0.08, 0.08, 0.0004)):
+
+    def fit(sought: float) -> tuple[Grid, float]:
         start = Grid(
             place,
             np.zeros(2),
             np.array([frequency, _offset(elevation, frequency)]),
             np.array([sought, _offset(azimuth, sought)]),
         )
-        fits.append(_sharpened(start, windows.points))
-    return fits
+        return _sharpened(start, windows.points)
+
+    return each(fit, _clearest(azimuth, frequency + np.arange(-0.08, 0.08, 0.0004)))
 
 
 def _clearest(angle_deg: Float64, frequencies: Float64) -> list[float]:

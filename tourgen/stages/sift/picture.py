@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import minimum_filter, uniform_filter
 
+from tourgen.extent import extent
 from tourgen.geometry import Float32, Float64
 
 Mask = npt.NDArray[np.bool_]
@@ -87,7 +88,7 @@ class Picture:
 def picture(direction: Float32, range_m: Float32) -> Picture:
     """Of (n, 3) unit directions and (n,) metres; n >= 1."""
     angle = _angles(direction)
-    low, high = angle.min(axis=0), angle.max(axis=0)
+    low, high = extent(angle)
     cell_rad = max(_CELL_STEPS * _step(angle), _finest(high - low, len(angle)))
     cell = np.floor((angle - low) / np.float32(cell_rad)).astype(np.int64)
     shape = (int(cell[:, 0].max()) + 1, int(cell[:, 1].max()) + 1)

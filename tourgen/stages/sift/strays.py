@@ -19,6 +19,7 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from tourgen.geometry import Float32, Int32
 from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import components
+from tourgen.voxels import grouped, voxels
 
 Mask = npt.NDArray[np.bool_]
 _SPOT_M = 1e-4
@@ -96,12 +97,9 @@ def _occupied(
     points: Float32, edge_m: float
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Cells of a grid that hold points, the cell of each point, and how many each holds."""
-    low = points.min(axis=0)
-    cell = np.floor((points - low) / edge_m).astype(np.int64)
-    _, rows, columns = shape = cell.max(axis=0) + 1
-    key, inverse, counts = np.unique(
-        (cell[:, 0] * rows + cell[:, 1]) * columns + cell[:, 2],
-        return_inverse=True,
-        return_counts=True,
-    )
-    return np.stack(np.unravel_index(key, shape), axis=1), inverse.reshape(-1), counts
+    number, shape = voxels(points, edge_m)
+    order, starts = grouped(number)
+    counts = np.diff(starts, append=len(order))
+    inverse = np.empty(len(order), np.int64)
+    inverse[order] = np.repeat(np.arange(len(starts)), counts)
+    return np.stack(np.unravel_index(number[order[starts]], shape), axis=1), inverse, counts

@@ -30,9 +30,9 @@ from tourgen.rays import ray_scene
 from tourgen.stages.mesh_arrays import face_areas, vertex_normals
 from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.tangent_planes import TangentPlanes
-from tourgen.stages.thin import voxel_groups
+from tourgen.voxels import voxel_groups
 
-VERSION = 8
+VERSION = 9
 Mask = npt.NDArray[np.bool_]
 
 
@@ -84,16 +84,16 @@ def auto(oriented: OrientedCloud, settings: Settings) -> Chosen:
     shapes = signed_distance.shapes(oriented, settings.distance)
     planes = shapes.planes
     known = signed_distance.distances(planes, settings.distance)
-    dense = known.zero_set(oriented.cloud.origin)
+    dense = known.zero_set(oriented.cloud.origin, sharp=False)
     if not len(dense.faces):
         return Chosen(poisson.poisson(oriented, settings.alone), 0.0)
     solved = poisson.poisson(_evenly(dense, settings), settings.solve)
     reach_m = settings.distance.reach * settings.distance.spacing_m
-    if _share(solved, planes, reach_m) < settings.least_share:
+    near = _near(solved, planes, reach_m)
+    if _share(solved, near) < settings.least_share:
         return Chosen(poisson.poisson(oriented, settings.alone), 0.0)
-    gap = ~_near(solved, planes, reach_m)
-    mesh = known.carried_on(_Closed(solved, gap)).zero_set(oriented.cloud.origin)
-    share = _share(mesh, planes, reach_m)
+    mesh = known.carried_on(_Closed(solved, ~near)).zero_set(oriented.cloud.origin)
+    share = _share(mesh, _near(mesh, planes, reach_m))
     return Chosen(shapes.with_rods(mesh, settings.distance), share)
 
 
@@ -107,10 +107,10 @@ def _evenly(mesh: Mesh, settings: Settings) -> OrientedCloud:
     return OrientedCloud(cloud, vertex_normals(mesh)[at], np.empty((0, 3)))
 
 
-def _share(mesh: Mesh, planes: TangentPlanes, most_m: float) -> float:
-    """The part of a mesh's area that lies within ``most_m`` of a plane's point."""
+def _share(mesh: Mesh, chosen: Mask) -> float:
+    """The part of a mesh's area in chosen faces."""
     area = face_areas(mesh)
-    return float((area * _near(mesh, planes, most_m)).sum() / area.sum())
+    return float(area[chosen].sum() / area.sum())
 
 
 def _near(mesh: Mesh, planes: TangentPlanes, most_m: float) -> Mask:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from tourgen.compiled import compiled
 from tourgen.geometry import Float32, Float64, Int32
 
 _SPREAD_DEG = 28.0
@@ -23,7 +24,6 @@ _FARTHEST = 1.0
 """A feature farther from the middle of its loop, in cells, is none."""
 _OFF = 0.15
 """One farther from its planes, in cells, root mean square, is none."""
-_CHUNK = 1 << 17
 
 Mask = npt.NDArray[np.bool_]
 
@@ -51,10 +51,8 @@ def with_features(
     Returns:
         The vertices and those of features after them, and (f, 3) faces.
     """
-    bent = np.concatenate(
-        [np.zeros(0, bool)]
-        + [_bent(loops[i : i + _CHUNK], normals) for i in range(0, len(loops), _CHUNK)]
-    )
+    bent = np.empty(len(loops), np.bool_)
+    _mark_bent(loops, normals, np.float32(np.cos(np.radians(_SPREAD_DEG))), bent)
     chosen = np.flatnonzero(bent)
     places, sound = _places(vertices, loops[chosen], normals, cell_m)
     chosen, places = chosen[sound], places[sound]
@@ -66,14 +64,23 @@ def with_features(
     return vertices, np.concatenate([fans(loops[plain]), around])
 
 
-def _bent(loops: Int32, normals: Float32) -> Mask:
-    """Mask of the loops whose normals spread."""
-    own = normals[loops]
-    there = loops >= 0
-    own[~there] = 0
-    alike = np.einsum("lij,lkj->lik", own, own)
-    alike[~(there[:, :, None] & there[:, None, :])] = 1
-    return np.asarray(alike.min(axis=(1, 2)) < np.cos(np.radians(_SPREAD_DEG)))  # NaN is not
+@compiled
+def _mark_bent(loops: Int32, normals: Float32, least: np.float32, bent: Mask) -> None:
+    """Write which loops have normals that spread: where one is unknown, none do."""
+    for i in range(len(loops)):
+        alike = np.float32(1)
+        known = True
+        for a in range(loops.shape[1]):
+            one = loops[i, a]
+            if one < 0:
+                break
+            known = known and not np.isnan(normals[one, 0])
+            for b in range(a):
+                other = loops[i, b]
+                turn = normals[one, 0] * normals[other, 0]
+                turn += normals[one, 1] * normals[other, 1]
+                alike = min(alike, turn + normals[one, 2] * normals[other, 2])
+        bent[i] = known and alike < least
 
 
 def _places(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tourgen.compiled import compiled
+from tourgen.extent import extent
 from tourgen.geometry import Float32, Int32
 from tourgen.neighbours import Grid, Neighbours, nearest_to
 from tourgen.stages.surface.growing import distinct
@@ -53,8 +54,8 @@ class Field:
             reach_m[order],
         )
         self.cell_m = np.float32(cell_m)
-        low = planes.points.min(axis=0)
-        extent_m = np.float32((planes.points.max(axis=0) - low).max())
+        low, high = extent(planes.points)
+        extent_m = np.float32((high - low).max())
         self.low = low - self._reach_m.max() - 2 * self.cell_m - np.float32(_MARGIN) * extent_m
         self.seeds = self.cells(planes.points)
 

@@ -25,6 +25,7 @@ from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import components
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.symmetric import axes_of
+from tourgen.voxels import grouped, voxels
 
 _SURFEL = 2.5
 """Edge of the voxels whose tangent planes are averaged, in spacings."""
@@ -113,12 +114,12 @@ def flattened(planes: TangentPlanes, spacing_m: float) -> tuple[TangentPlanes, F
 
 def _surfels(planes: TangentPlanes, edge_m: float) -> _Surfels:
     """Mean tangent plane of each voxel and main direction of its normals."""
-    cell = np.floor((planes.points - planes.points.min(axis=0)) / edge_m).astype(np.int64)
     axis = np.abs(planes.normals).argmax(axis=1)
     side = 2 * axis + (np.take_along_axis(planes.normals, axis[:, None], 1)[:, 0] > 0)
-    shape = (*(cell.max(axis=0) + 1), 6)
-    key = np.ravel_multi_index((*cell.T, side), shape)
-    _, group, count = np.unique(key, return_inverse=True, return_counts=True)
+    order, starts = grouped(voxels(planes.points, edge_m)[0] * 6 + side)
+    count = np.diff(starts, append=len(order))
+    group = np.empty(len(order), np.int64)
+    group[order] = np.repeat(np.arange(len(starts)), count)
     point, normal = (
         np.stack([np.bincount(group, values[:, k]) for k in range(3)], axis=1) / count[:, None]
         for values in (planes.points, planes.normals)

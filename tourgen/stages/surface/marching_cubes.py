@@ -19,6 +19,7 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
+from tourgen.compiled import compiled
 from tourgen.geometry import Float32, Float64, Int32, Mesh
 from tourgen.stages.surface.features import fans, with_features
 
@@ -37,6 +38,7 @@ AROUND: Keys = np.array([np.dot(way, STEPS) for way in product((-1, 0, 1), repea
 _EDGES = [(c, c | 1 << axis) for axis in range(3) for c in range(8) if not c >> axis & 1]
 _MOST_LOOPS = 4
 _LONGEST_LOOP = 7
+_NO_LOOPS: Int32 = np.empty((0, _LONGEST_LOOP), np.int32)
 _LEAST_SHARE = 1e-3
 """How near a vertex may come to a corner, in edges: nearer, its faces have no area."""
 
@@ -86,15 +88,11 @@ def marching_cubes(
         Faces counter-clockwise seen from where the value is positive; cells share vertices.
         No faces where nothing crosses zero.
     """
-    after = np.stack([find(key, key + step) for step in STEPS], axis=1)
-    cells = _cells(after, value)
-    case = ((value[cells] > 0) << np.arange(8)).sum(axis=1)
-    crossed = (case > 0) & (case < 255)
-    cells, case = cells[crossed], case[crossed]
-    smooth = _smooth(value[cells], np.float32(steepest * cell_m))
-    cells, case = cells[smooth], case[smooth]
+    after = _next(key)
     vertex_of, vertices = _vertices(key, value, after, low, cell_m)
-    loops = _loops_of(cells, case, vertex_of)
+    asked = value, after, vertex_of, np.float32(steepest * cell_m), *_table()
+    loops = np.empty((_cut(*asked, _NO_LOOPS), _LONGEST_LOOP), np.int32)
+    _cut(*asked, loops)
     if normals is None:
         faces = fans(loops)
     else:
@@ -109,24 +107,81 @@ def find(key: Keys, wanted: Keys) -> Int32:
     return np.where(key[at] == wanted, at, -1).astype(np.int32)
 
 
-def _cells(after: Int32, value: Float32) -> Int32:
-    """(m, 8) the corners of the cells of which all are known."""
-    known = ~np.isnan(value)
-    cells = np.flatnonzero(known).astype(np.int32)[:, None]
+@compiled
+def _next(key: Keys) -> Int32:
+    """(n, 3) position of the next corner from each along each axis, -1 where it is not there."""
+    after = np.full((len(key), 3), -1, np.int32)
     for axis in range(3):
-        beyond = after[cells, axis]
-        whole = np.all((beyond >= 0) & known[beyond], axis=1)
-        cells = np.concatenate([cells[whole], beyond[whole]], axis=1)
-    return cells
+        step = STEPS[axis]
+        j = 0
+        for i in range(len(key)):
+            while j < len(key) and key[j] < key[i] + step:
+                j += 1
+            if j < len(key) and key[j] == key[i] + step:
+                after[i, axis] = j
+    return after
 
 
-def _smooth(value: Float32, most: np.float32) -> npt.NDArray[np.bool_]:
-    """Mask of the cells along none of whose edges the value jumps across zero."""
-    smooth = np.ones(len(value), bool)
-    for a, b in _EDGES:
-        jumps = np.abs(value[:, a] - value[:, b]) > most
-        smooth &= ~(jumps & ((value[:, a] > 0) != (value[:, b] > 0)))
-    return smooth
+@compiled
+def _cut(
+    value: Float32,
+    after: Int32,
+    vertex_of: Int32,
+    most: np.float32,
+    table: Int32,
+    edge_corner: Int32,
+    edge_axis: Int32,
+    loops: Int32,
+) -> int:
+    """Write the vertices of each loop, -1 after its end, where there is room; how many there are.
+
+    Cells of which a corner is unknown, or along one of whose edges the value jumps across zero,
+    have none.
+    """
+    corner = np.empty(8, np.int32)
+    found = 0
+    for i in range(len(value)):
+        corner[0] = i
+        case = 0
+        for c in range(8):
+            if c:
+                axis = 2 if c > 3 else 1 if c > 1 else 0
+                corner[c] = after[corner[c - (1 << axis)], axis]
+            if corner[c] < 0 or np.isnan(value[corner[c]]):
+                case = 0
+                break
+            case |= (value[corner[c]] > 0) << c
+        if case in (0, 255) or _jumps(value, corner, case, most, edge_corner, edge_axis):
+            continue
+        for loop in table[case]:
+            if loop[0] < 0:
+                break
+            if found < len(loops):
+                for k in range(len(loop)):
+                    edge = loop[k]
+                    at = corner[edge_corner[edge]]
+                    loops[found, k] = vertex_of[at, edge_axis[edge]] if edge >= 0 else -1
+            found += 1
+    return found
+
+
+@compiled
+def _jumps(
+    value: Float32,
+    corner: Int32,
+    case: int,
+    most: np.float32,
+    edge_corner: Int32,
+    edge_axis: Int32,
+) -> bool:
+    """Whether along an edge of a cell the value jumps across zero."""
+    for edge in range(len(edge_corner)):
+        a = edge_corner[edge]
+        b = a | 1 << edge_axis[edge]
+        crosses = (case >> a & 1) != (case >> b & 1)
+        if crosses and abs(value[corner[a]] - value[corner[b]]) > most:
+            return True
+    return False
 
 
 def _vertices(
@@ -143,19 +198,6 @@ def _vertices(
     vertices = corner_of(key[corner]).astype(np.float32)
     vertices[np.arange(len(corner)), axis] += share
     return number, vertices * np.float32(cell_m) + low
-
-
-def _loops_of(cells: Int32, case: npt.NDArray[np.int64], vertex_of: Int32) -> Int32:
-    """(l, 7) the vertices of each loop, -1 after its end."""
-    table, edge_corner, edge_axis = _table()
-    found = [np.empty((0, _LONGEST_LOOP), np.int32)]
-    for loop in range(_MOST_LOOPS):
-        more = table[case, loop, 0] >= 0
-        cells, case = cells[more], case[more]
-        edge = table[case, loop]
-        corner = np.take_along_axis(cells, edge_corner[edge], axis=1)
-        found.append(np.where(edge >= 0, vertex_of[corner, edge_axis[edge]], -1))
-    return np.concatenate(found)
 
 
 def _used(faces: Int32, count: int) -> tuple[npt.NDArray[np.bool_], Int32]:

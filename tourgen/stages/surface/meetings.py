@@ -19,8 +19,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import binary_closing
 
-from tourgen.geometry import Float32, Float64
+from tourgen.compiled import compiled
+from tourgen.geometry import Float32, Float64, Int32
 from tourgen.neighbours import Neighbours
+from tourgen.sorting import order_of
 from tourgen.stages.cells import cells_of
 from tourgen.stages.surface.flats import Flats
 from tourgen.stages.surface.tangent_planes import TangentPlanes
@@ -93,10 +95,8 @@ def _pairs(points: Float32, flats: Flats, spacing_m: float) -> Iterator[tuple[in
     middle = cells.means(points)
     most_m = (_REACH + _CELL) * spacing_m
     near, _ = Neighbours.of(middle, _NEIGHBOURS).nearest(middle, _NEIGHBOURS, most_m)
-    one, rank = np.nonzero(near >= 0)
-    pair = _creased(cells.owner[one], cells.owner[near[one, rank]], flats)
-    one, pair = one[pair >= 0], pair[pair >= 0]
-    order = np.argsort(pair, kind="stable")
+    pair, one = _creased(cells.owner, near, flats.normals, flats.narrow)
+    order = order_of(pair)
     for chosen in np.split(order, np.flatnonzero(np.diff(pair[order])) + 1):
         if len(chosen):
             around = near[np.unique(one[chosen])]
@@ -105,19 +105,34 @@ def _pairs(points: Float32, flats: Flats, spacing_m: float) -> Iterator[tuple[in
             yield first, second, cells.members(groups)
 
 
-def _creased(one: Ints, other: Ints, flats: Flats) -> Ints:
-    """(n,) number of each pair of flats, the lower times their count plus the higher.
+@compiled
+def _creased(owner: Ints, near: Int32, normals: Float64, narrow: Mask) -> tuple[Ints, Ints]:
+    """Pairs of flats that leave a crease, by the cells in which they are near each other.
 
-    -1 where they are no two flats, or leave no crease.
+    Args:
+        owner: (g,) the flat of each cell, their count for none.
+        near: (g, k) cells near each, -1 after the last.
+        normals: (p, 3) of the flats.
+        narrow: (p,) which are strips.
+
+    Returns:
+        (n,) number of each pair, the lower flat times their count plus the higher; (n,) its cell.
     """
-    none = len(flats.normals)
-    low, high = np.minimum(one, other), np.maximum(one, other)
-    pair = np.where((high < none) & (low < high), low * none + high, -1)
-    real = np.flatnonzero(pair >= 0)
-    low, high = low[real], high[real]
-    cosine = np.abs(np.einsum("ij,ij->i", flats.normals[low], flats.normals[high]))
-    pair[real[(cosine >= _BLUNT) | (flats.narrow[low] & flats.narrow[high])]] = -1
-    return np.asarray(pair)
+    none = len(normals)
+    pair, cell = np.empty(near.size, np.int64), np.empty(near.size, np.int64)
+    found = 0
+    for i in range(len(near)):
+        for j in near[i]:
+            if j < 0:
+                break
+            low, high = min(owner[i], owner[j]), max(owner[i], owner[j])
+            if high == none or low == high or (narrow[low] and narrow[high]):
+                continue
+            one, other = normals[low], normals[high]
+            if abs(one[0] * other[0] + one[1] * other[1] + one[2] * other[2]) < _BLUNT:
+                pair[found], cell[found] = low * none + high, i
+                found += 1
+    return pair[:found], cell[:found]
 
 
 @dataclass(frozen=True, slots=True)

@@ -129,10 +129,10 @@ def _sticks(points: Float32, spacing_m: float) -> Iterator[Ints]:
     near = Neighbours.of(points, count).nearest(points, count, _REACH * spacing_m)[0][:, 1:]
     along, thin = _ways(points, near)
     stick = components(_joined(points, near, along, thin), len(points))
-    order = np.argsort(stick, kind="stable")
-    for own in np.split(order, np.flatnonzero(np.diff(stick[order])) + 1):
-        if len(own) >= _POINTS:
-            yield own
+    of_many = np.flatnonzero((np.bincount(stick) >= _POINTS)[stick])
+    order = of_many[np.argsort(stick[of_many], kind="stable")]
+    if len(order):
+        yield from np.split(order, np.flatnonzero(np.diff(stick[order])) + 1)
 
 
 @compiled
@@ -214,10 +214,22 @@ def _fitted(points: Float32, normals: Float32, noise_m: float, spacing_m: float)
     def cost(told: Float64) -> Float64:
         return np.append(_off_m(points, *line(told), told[4]), belief * (told[4] - wide_m))
 
+    def slopes(told: Float64) -> Float64:
+        start, along = line(told)
+        apart = points - start
+        reach = apart @ along
+        away = apart - np.outer(reach, along)
+        away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
+        shifted = -away @ across.T
+        turned = shifted * (reach / np.linalg.norm(axis + told[2:4] @ across))[:, None]
+        by_point = np.column_stack([shifted, turned, np.full(len(points), -1.0)])
+        return np.vstack([by_point, [0, 0, 0, 0, belief]])
+
     tried = [
         least_squares(
             cost,
             np.array([radius, 0, 0, 0, radius]),
+            slopes,
             # The axis lies behind what was seen: noise makes a short arc look hollow.
             bounds=([0, -0.1, -1, -1, low], [0.1, 0.1, 1, 1, high]),
             loss="soft_l1",

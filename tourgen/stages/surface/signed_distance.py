@@ -46,6 +46,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.errors import StageError
+from tourgen.extent import extent
 from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud
 from tourgen.stages.sift.strays import clusters
 from tourgen.stages.surface.field import Field
@@ -70,7 +71,7 @@ from tourgen.stages.surface.tangent_planes import (
 )
 from tourgen.stages.surface.tubes import Rod, with_tubes
 
-VERSION = 15
+VERSION = 16
 _APART = 3.0
 """Spacings between points that stand apart."""
 _HANDFUL = 12
@@ -178,7 +179,8 @@ def shapes(oriented: OrientedCloud, settings: Settings) -> Shapes:
         StageError: There are none.
     """
     oriented = distinct_samples(oriented)
-    extent_m = float(np.ptp(oriented.cloud.points, axis=0).max())
+    low, high = extent(oriented.cloud.points)
+    extent_m = float((high - low).max())
     require_range("cell_m", settings.cell_m, extent_m / most_cells(), 1)
     noise_m = noise_of(oriented) if settings.noise_m is None else settings.noise_m
     noise_m = max(noise_m, settings.spacing_m / 100)
@@ -230,8 +232,8 @@ class Distances:
     value: Float32
     steepest: float
 
-    def zero_set(self, origin: Float64) -> Mesh:
-        """Where the distance is zero; no faces where it nowhere is."""
+    def zero_set(self, origin: Float64, *, sharp: bool = True) -> Mesh:
+        """Where the distance is zero, creases sharp or cut off; no faces where it nowhere is."""
         low, cell_m = self.field.low, float(self.field.cell_m)
         return marching_cubes(
             self.key,
@@ -240,7 +242,7 @@ class Distances:
             cell_m,
             origin,
             steepest=self.steepest,
-            normals=self.field.normal,
+            normals=self.field.normal if sharp else None,
         )
 
     def carried_on(self, beyond: Beyond) -> Distances:
