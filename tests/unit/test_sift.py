@@ -11,6 +11,7 @@ from tourgen.errors import InputError
 from tourgen.geometry import PointCloud
 from tourgen.stages import sift
 from tourgen.stages.sift.grown import bodies
+from tourgen.stages.sift.mirrors import outlined
 from tourgen.stages.sift.nearby import nearby
 from tourgen.stages.sift.picture import picture
 from tourgen.stages.sift.views import View, views
@@ -279,6 +280,19 @@ def test_a_slanted_surface_is_looked_through_to_the_centimetre() -> None:
     for height_m, passed in ((0.0, 0.0), (0.04, 0.99)):
         _, beyond_m = view.beyond_m(places + np.float32([0, 0, height_m]))
         assert (beyond_m > 0.02).mean() == pytest.approx(passed, abs=0.01)
+
+
+def test_a_ghost_beside_its_mirror_does_not_widen_it() -> None:
+    """Three that fold onto the room by chance, seen half a metre aside, take no wall along."""
+    rng = np.random.default_rng(0)
+    normal, place = np.array([0.0, 1, 0]), np.array([0.2, -2.9, 1.6])
+    patch = rng.uniform((-0.3, 0, -0.4), (0.3, 0, 0.4), (8000, 3))
+    aside = np.array([[-0.8, 0, 0.1], [-0.82, 0, 0.15], [0.1, 0, 0.9]])
+    mirror = outlined(normal, place, np.concatenate([patch, aside]))
+    assert mirror is not None
+    station = place + np.array([0.0, 3, 0])
+    through = place + 2 * np.array([[0.25, -1.5, 0.3], [-0.5, -1.5, 0.1], [0.05, -1.5, 0.6]])
+    assert mirror.hides(station, through.astype(np.float32), 0.05).tolist() == [True, False, False]
 
 
 @pytest.mark.parametrize("case", ["far away", "one spot", "one far off"])

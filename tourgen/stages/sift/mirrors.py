@@ -22,6 +22,7 @@ from scipy.optimize import minimize
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from tourgen.geometry import Float32, Float64
+from tourgen.stages.sift.strays import clusters
 from tourgen.stages.sift.views import View
 
 Mask = npt.NDArray[np.bool_]
@@ -120,7 +121,7 @@ def reflections(
             _crossing(*glass, each.station, points[each.index[part]], tree)
             for each, part in _apart(cluster, seen)
         ]
-        mirror = _outlined(*glass, np.concatenate(crossing))
+        mirror = outlined(*glass, np.concatenate(crossing))
         if mirror is None:
             continue
         shown: list[tuple[npt.NDArray[np.int64], Float32]] = []
@@ -231,9 +232,14 @@ def _across(normal: Float64) -> Float64:
     return np.stack([first, np.cross(normal, first)])
 
 
-def _outlined(normal: Float64, place: Float64, crossing: Float64) -> Mirror | None:
-    """The mirror as large as the patch through which ghosts are seen, and its rim."""
+def outlined(normal: Float64, place: Float64, crossing: Float64) -> Mirror | None:
+    """The mirror as large as the patch through which ghosts are seen, and its rim.
+
+    A few ghosts that fold onto the room by chance are seen beside it, through nothing.
+    """
     across = _across(normal)
+    patch = clusters(crossing.astype(np.float32), _RIM_M)
+    crossing = crossing[(np.bincount(patch) >= _LEAST_POINTS)[patch]]
     try:
         outline = ConvexHull(crossing @ across.T).equations
     except (QhullError, ValueError):
