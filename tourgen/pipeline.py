@@ -22,6 +22,7 @@ from tourgen.remote import local
 from tourgen.scheduler import RoomTasks, run_missing
 from tourgen.stages import (
     bake,
+    crowding,
     entry,
     exposure,
     floor,
@@ -95,7 +96,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         partial(points.read, room, folder, stamps),
         settings=points.reading(room),
         digests=tuple(digests[local(folder, each.file)] for each in room.scans),
-        version=3,
+        version=4,
         libraries=("pye57",),
     )
     stood = task(
@@ -111,8 +112,8 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         points.owned,
         scanned,
         stood,
-        settings=ownership.Settings(),
-        version=ownership.VERSION,
+        settings=points.owning(room),
+        version=ownership.VERSION + crowding.VERSION,
         libraries=("numba", "scipy"),
     )
     joined = task(
@@ -347,7 +348,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         found,
         tree,
         files,
-        version=4,
+        version=5,
     )
     scan_mb = sum(local(folder, each.file).stat().st_size for each in room.scans) / 1e6
     return RoomRecipe(room, scan_mb, files, pictured, entered, measured, summary)

@@ -39,6 +39,7 @@ def _room_report(room: RoomResult) -> Mapping[str, Any]:
         "points_invalid": summary.facts.dropped_invalid,
         "points_cropped": summary.facts.dropped_cropped,
         "points_repeated": summary.facts.dropped_repeated,
+        "points_crowded": summary.points_crowded,
         "points_removed": dict(summary.removed),
         "points_used": summary.points_used,
         "stations": summary.stations.round(3).tolist(),

@@ -26,7 +26,7 @@ from true_picture import Shot, TexturedTruth, busiest, cameras_in, true_shots
 
 from tourgen.geometry import UInt8
 from tourgen.rays import ray_scene
-from tourgen.stages import normals, ownership, register, sift, stations
+from tourgen.stages import crowding, normals, ownership, register, sift, stations
 from tourgen.tour import load_tour
 
 VERSION = 2
@@ -224,7 +224,9 @@ class Bench:
                 case = cleaning.modelled(tour, self.room.id, kind)
             return cleaning.figures(case, cleaning.cleaned(case))
 
-        code = "-".join(str(each.VERSION) for each in (stations, ownership, register, sift))
+        code = "-".join(
+            str(each.VERSION) for each in (stations, crowding, ownership, register, sift)
+        )
         return {
             kind: self.ledger.figures(
                 f"cleaning-{kind}-{code}-{stamp(self.room.scan)}", lambda kind=kind: measure(kind)

@@ -30,11 +30,12 @@ import open3d as o3d
 from scipy.spatial import cKDTree
 from score import Truth, load, spread
 
+from tourgen.fitting.points import CROWDED_MM
 from tourgen.geometry import Float64, PointCloud
 from tourgen.rays import ray_scene
 from tourgen.scans import open_scan, read_room
 from tourgen.simulate import VERSION
-from tourgen.stages import ownership, register, sift, stations
+from tourgen.stages import crowding, ownership, register, sift, stations
 from tourgen.tour import load_tour
 
 SURFACE, MIXED, STRAY, GHOST, PASSER_BY = range(5)
@@ -129,12 +130,14 @@ class Cleaned:
     """What a build makes of a scan.
 
     Attributes:
-        cloud: All points, their stations brought together.
+        asked: (n,) positions of the points that did not crowd others, which were cleaned.
+        cloud: These points, their stations brought together.
         stations: (s, 3) metres, that it goes by.
         kept: (n,) mask of the points left.
         seconds: Processor time of sifting alone.
     """
 
+    asked: npt.NDArray[np.int64]
     cloud: PointCloud
     stations: Float64
     kept: npt.NDArray[np.bool_]
@@ -143,29 +146,32 @@ class Cleaned:
 
 def cleaned(case: Case) -> Cleaned:
     """Find what the scan does not tell, register, sift."""
-    known, cloud = case.stations, case.cloud
+    known, points = case.stations, case.cloud.points
     if not len(known):
-        known = stations.find_stations(cloud.points, stations.Settings())
+        known = stations.find_stations(points, stations.Settings())
+    asked = crowding.crowding(points, crowding.Settings(*(each / 1000 for each in CROWDED_MM)))
+    cloud = case.cloud.take(asked)
     if (cloud.station < 0).any() and len(known):
-        owned = ownership.ownership(cloud.points, known, ownership.Settings())
+        owned = ownership.ownership(points, known, ownership.Settings(), asked)
         known, cloud = owned.stations, replace(cloud, station=owned.station)
     joined = register.register(cloud, known, register.Settings())
     begun = time.process_time()
     sifted = sift.sift(joined.cloud, joined.stations, sift.Settings())
     seconds = time.process_time() - begun
     kept = np.isin(_rows(joined.cloud.points), _rows(sifted.cloud.points))
-    return Cleaned(joined.cloud, joined.stations, kept, seconds)
+    return Cleaned(asked, joined.cloud, joined.stations, kept, seconds)
 
 
 def figures(case: Case, done: Cleaned) -> dict[str, float]:
     """How true the points left are."""
+    label, off_m = case.label[done.asked], case.off_m[done.asked]
     wrong = {
-        "stray": case.label == STRAY,
-        "ghost": case.label == GHOST,
-        "passer-by": case.label == PASSER_BY,
-        "mixed": (case.label == MIXED) & (case.off_m > NEAR_M),
-        "mixed, all": case.label == MIXED,
-        "surface": case.label == SURFACE,
+        "stray": label == STRAY,
+        "ghost": label == GHOST,
+        "passer-by": label == PASSER_BY,
+        "mixed": (label == MIXED) & (off_m > NEAR_M),
+        "mixed, all": label == MIXED,
+        "surface": label == SURFACE,
     }
     shares = {name: float((~done.kept[at]).mean()) for name, at in wrong.items() if at.any()}
     before = _gap_m(done.cloud.points, case.wanted) <= NEAR_M

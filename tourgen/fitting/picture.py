@@ -78,6 +78,7 @@ class Summary:
         origin: (3,) float64, of all the room's coordinates.
         bounds: (2, 3) float64, lowest and highest corner, metres from the origin.
         facts: How reading went.
+        points_crowded: Points dropped since others are as near as no picture could show.
         points_used: Points left after cleaning.
         stations: (s, 3) float64, given or found, metres from the origin.
         station_moved_mm: (s,) float64, how far registration moved each.
@@ -89,6 +90,7 @@ class Summary:
     origin: Float64
     bounds: Float64
     facts: ReadFacts
+    points_crowded: int
     points_used: int
     stations: Float64
     station_moved_mm: Float64
@@ -283,6 +285,7 @@ def summarised(
         scan.cloud.origin,
         np.stack([vertices.min(axis=0), vertices.max(axis=0)]),
         scan.facts,
+        len(scan.cloud) - len(joined.cloud),
         len(kept.cloud),
         joined.stations,
         joined.moved_mm,

@@ -19,13 +19,28 @@ from tourgen.fitting.plausible import require_room
 from tourgen.geometry import Float64, OrientedCloud, Panorama, PointCloud
 from tourgen.remote import local
 from tourgen.scans import ReadFacts, read_panoramas, read_room, without_repeats
-from tourgen.stages import exposure, floor, normals, ownership, register, sift, stations, thin
+from tourgen.stages import (
+    crowding,
+    exposure,
+    floor,
+    normals,
+    ownership,
+    register,
+    sift,
+    stations,
+    thin,
+)
 from tourgen.stages.spacing import Spacing, spacing
 from tourgen.tour import Room, open_scans
 
+CROWDED_MM = (3.0, 4.0)
+"""Points at most so far apart crowd each other, and where there are very many, unless finer
+pictures are asked for."""
 _SPACING_MM = (0.1, 1000.0)
 _LEAST_POINTS = 100
 """Fewer tell no surface."""
+_REPEATING = 50_000_000
+"""Of more points those that repeat others go with what is crowded: a sort would take gigabytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +62,14 @@ class Thinning:
 
     detail_mm: float | None
     thin_mm: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Owning:
+    """How points are told apart by their stations, and which of them stay."""
+
+    grids: ownership.Settings
+    crowds: crowding.Settings
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +132,8 @@ def read(room: Room, folder: Path, stamps: Mapping[str, str], _: Reading) -> Roo
     cloud, found, facts = read_room(scans, room.keep, room.remove, room.clean.min_points)
     _require_unchanged(folder, stamps)
     count = len(cloud)
-    cloud = without_repeats(cloud)
+    if count <= _REPEATING:
+        cloud = without_repeats(cloud)
     facts = replace(facts, dropped_repeated=count - len(cloud))
     told = require_room(cloud.points, room, facts)
     facts = replace(facts, warnings=(*facts.warnings, *told))
@@ -140,12 +164,22 @@ def stations_of(scan: RoomScan, settings: stations.Settings) -> Float64:
     return stations.find_stations(scan.cloud.points, settings)
 
 
-def owned(scan: RoomScan, places: Float64, settings: ownership.Settings) -> Stationed:
-    """Tell which station measured each point, where the scan has forgotten."""
-    if not len(places) or np.all(scan.cloud.station >= 0):
-        return Stationed(scan.cloud, places)
-    found = ownership.ownership(scan.cloud.points, places, settings)
-    return Stationed(replace(scan.cloud, station=found.station), found.stations)
+def owning(room: Room) -> Owning:
+    """Which points of a room show neither in a picture nor in the surface."""
+    asked = (room.texture.texel_mm, room.surface.detail_mm, room.clean.thin_mm)
+    voxel_mm, widest_mm = (min(each, *filter(None, asked)) for each in CROWDED_MM)
+    return Owning(ownership.Settings(), crowding.Settings(voxel_mm / 1000, widest_mm / 1000))
+
+
+def owned(scan: RoomScan, places: Float64, settings: Owning) -> Stationed:
+    """Thin what is crowded, and tell who measured each point, where the scan has forgotten."""
+    cloud = scan.cloud
+    kept = crowding.crowding(cloud.points, settings.crowds)
+    left = cloud if len(kept) == len(cloud) else cloud.take(kept)
+    if not len(places) or np.all(left.station >= 0):
+        return Stationed(left, places)
+    found = ownership.ownership(cloud.points, places, settings.grids, kept)
+    return Stationed(replace(left, station=found.station), found.stations)
 
 
 def registered(scan: Stationed, settings: register.Settings) -> register.Registered:

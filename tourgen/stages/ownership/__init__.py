@@ -39,6 +39,7 @@ from tourgen.stages.ownership.windows import (
     agreeing,
     angles,
     climbed,
+    drawn,
     rough,
     windows_about,
 )
@@ -46,7 +47,8 @@ from tourgen.threads import each, in_parts
 
 __all__ = ["VERSION", "Ownership", "Settings", "ownership"]
 
-VERSION = 6
+VERSION = 7
+Ints = npt.NDArray[np.int64]
 _BLOCK = 200_000
 _ABOUT_M = 0.03
 """How uncertain a place is that was found by its blind disc."""
@@ -57,8 +59,8 @@ class Ownership:
     """What the grids tell.
 
     Attributes:
-        station: (n,) int16, the station that measured each point; -1 throughout where that
-            cannot be told.
+        station: (m,) int16, the station that measured each point asked for; -1 throughout where
+            that cannot be told.
         stations: (s, 3) float64, their places, metres; as given where no grid was found.
     """
 
@@ -66,20 +68,24 @@ class Ownership:
     stations: Float64
 
 
-def ownership(points: Float32, stations: Float64, settings: Settings) -> Ownership:
+def ownership(
+    points: Float32, stations: Float64, settings: Settings, asked: Ints | None = None
+) -> Ownership:
     """Find the grids of stations in a merged cloud.
 
     Args:
         points: (n, 3) metres, z up, as merged: not averaged.
         stations: (s, 3) metres, known to some centimetres.
         settings: See ``Settings``.
+        asked: (m,) positions of the points whose owners are wanted; of all n if left out.
 
     Returns:
         The stations' exact places where the grid of each is found, else those given; and the owner
         of each point where moreover nearly all points lie on a grid. The few that lie on none
         follow the nearest that does.
     """
-    nobody = np.full(len(points), -1, np.int16)
+    asked = np.arange(len(points)) if asked is None else asked
+    nobody = np.full(len(asked), -1, np.int16)
 
     def sought(number: int) -> Grid | None:
         return _grid(points, stations[number], settings, np.random.default_rng([0, number]))
@@ -89,6 +95,7 @@ def ownership(points: Float32, stations: Float64, settings: Settings) -> Ownersh
     if not found or len(found) < len(grids):
         return Ownership(nobody, stations)
     places = np.array([grid.place for grid in found])
+    points = points[asked]
     owner = _nearest_grid(points, found, settings.most_off)
     known = owner >= 0
     if known.mean() < settings.least_matched:
@@ -146,7 +153,7 @@ def _grid(
         len(windows.points)
     ):
         return None
-    sample = points[rng.permutation(len(points))[: settings.polish_points]]
+    sample = points[drawn(len(points), settings.polish_points, rng)]
     sample = sample[np.abs(angles(sample, place)[0]) < HIGHEST_DEG]
     grids = each(lambda fit: polished(fit[0], sample, settings), fits)
     grids = [grid for grid in grids if grid.is_as_fine_as(settings.step_deg)]

@@ -65,7 +65,7 @@ def windows_about(
 ) -> Windows | None:
     """Windows of points that can be seen from a place; None where there are too few."""
     wanted = int(min(_SAMPLE * (settings.windows_deg[0] / window_deg) ** 2, _LARGEST_SAMPLE))
-    sample = points[rng.permutation(len(points))[:wanted]]
+    sample = points[drawn(len(points), wanted, rng)]
     elevation, azimuth, reach = angles(sample, place)
     near = _nearest(elevation, azimuth, reach)
     order = np.flatnonzero(near)[np.argsort(elevation[near])]
@@ -92,6 +92,16 @@ def windows_about(
     size = np.array([len(each) for each in chosen])
     first = np.concatenate([[0], np.cumsum(size)[:-1]])
     return Windows(sample[np.concatenate(chosen)].astype(np.float64), first, size)
+
+
+def drawn(count: int, wanted: int, rng: np.random.Generator) -> npt.NDArray[np.int64]:
+    """Positions of about so many of ``count`` points, rising; all of them where they are fewer.
+
+    A permutation of 150 million would take more than a gigabyte.
+    """
+    if wanted >= count:
+        return np.arange(count)
+    return np.unique(rng.integers(0, count, wanted))
 
 
 def _nearest(elevation: Float64, azimuth: Float64, reach: Float64) -> npt.NDArray[np.bool_]:
