@@ -2,13 +2,15 @@
 
 Whole processes, one after the other in one run: ``tourgen build`` without a cache, and the chains
 that are made by hand (``by_hand``), of the demo's first chamber scanned to each number of points.
-The chains solve at the depth that gives the detail which tourgen chose, and end with as many faces;
-beside the time stands how true each is, so that nobody wins by doing less.
+The chains solve at the two depths whose cells are next to the detail that tourgen chose, wider and
+narrower, and end with as many faces; beside the time stands how true each is, so that nobody wins
+by doing less.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import shutil
 import sys
@@ -26,7 +28,7 @@ from tourgen.fitting.lengths import detail_m
 from tourgen.geometry import PointCloud
 from tourgen.simulate import MODELS, Size, simulate_room
 from tourgen.stages.spacing import spacing
-from tourgen.stages.surface.poisson import octree_depth
+from tourgen.stages.surface.poisson import SCALE
 
 ROOM = "chamber1"
 POINTS = (130_000, 1_300_000, 15_200_000)
@@ -36,11 +38,11 @@ HEADING = "Time and memory"
 AROUND_M = 0.1
 PREAMBLE = """Made by `make bench-speed`: whole processes in one run, without a cache. `meshlab`
 and `open3d` are what one does by hand (`tests/peers/by_hand.py`): crop, normals, screened Poisson
-at the depth that gives the detail which tourgen chose, cut, quadric decimation to as many faces,
-UVs (trivial; xatlas on the whole mesh), colours to a texture of 4096 pixels, export. tourgen also
-cleans, registers, closes gaps, opens windows and packs all levels of detail. `times`: wall time
-over tourgen's. Memory is the sum over processes of proportional memory. F-score at 5 mm and the
-95th percentile of the distance to the truth tell that nobody wins by doing less.
+at the depths whose cells are next to the detail that tourgen chose, cut, quadric decimation to as
+many faces, UVs (trivial; xatlas on the whole mesh), colours to a texture of 4096 pixels, export.
+tourgen also cleans, registers, closes gaps, opens windows and packs all levels of detail. `times`:
+wall time over tourgen's. Memory is the sum over processes of proportional memory. F-score at 5 mm
+and the 95th percentile of the distance to the truth tell that nobody wins by doing less.
 """
 
 
@@ -90,15 +92,17 @@ def compared(points: int, given: argparse.Namespace) -> list[dict[str, Any]]:
     report = json.loads((tour / "site/report.json").read_text("utf-8"))["rooms"][ROOM]
     eye = truth.stations[0]
     low, high = truth.vertices.min(axis=0) - AROUND_M, truth.vertices.max(axis=0) + AROUND_M
-    for chain in given.chain or CHAINS:
-        out = tour / chain
+    asked = itertools.product(given.chain or CHAINS, _depths(tour, low, high))
+    for chain, (depth, cell_m) in asked:
+        name = f"{chain}, depth {depth} ({1000 * cell_m:.1f} mm)"
+        out = tour / f"{chain}-{depth}"
         shutil.rmtree(out, ignore_errors=True)
         told = [*map(str, (*low, *high))]
         command = [str(Path(__file__).with_name("by_hand.py")), chain]
         command += [str(tour / "scans" / f"{ROOM}.ply"), str(out), "--box", *told]
-        command += ["--eye", *map(str, eye), "--depth", str(_depth(tour, low, high))]
+        command += ["--eye", *map(str, eye), "--depth", str(depth)]
         command += ["--faces", str(report["faces"][-1])]
-        rows.append(row(chain, run(chain, *command), out / "mesh.ply"))
+        rows.append(row(name, run(out.name, *command), out / "mesh.ply"))
     return rows
 
 
@@ -118,15 +122,17 @@ def _scanned(points: int, tour: Path, demo: Path) -> None:
     )
 
 
-def _depth(tour: Path, low: Any, high: Any) -> int:
-    """Of the octree whose cells are as fine as the detail that tourgen chooses."""
+def _depths(tour: Path, low: Any, high: Any) -> list[tuple[int, float]]:
+    """Depths of the octree with the width of its cells, metres, about tourgen's detail."""
     import open3d as o3d
 
     points = np.asarray(o3d.io.read_point_cloud(str(tour / f"scans/{ROOM}.ply")).points, np.float32)
     points = points[((points > low) & (points < high)).all(axis=1)]
     nothing = np.zeros((len(points), 3), np.uint8)
     cloud = PointCloud(np.zeros(3), points, nothing, np.full(len(points), -1, np.int16))
-    return octree_depth(points, detail_m(spacing(cloud), None))
+    side_m = SCALE * float(np.ptp(points, axis=0).max())
+    deepest = int(np.ceil(np.log2(side_m / detail_m(spacing(cloud), None))))
+    return [(depth, side_m / 2**depth) for depth in (deepest - 1, deepest)]
 
 
 def markdown(rows: list[dict[str, Any]]) -> str:

@@ -14,7 +14,8 @@ from tourgen.errors import StageError
 from tourgen.geometry import Mesh, OrientedCloud
 
 VERSION = 2
-_SCALE = 1.1  # the solver's cube over the cloud's box
+SCALE = 1.1
+"""The solver's cube over the cloud's box."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +60,7 @@ def poisson(oriented: OrientedCloud, settings: Settings) -> Mesh:
     solved, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
         pcd,
         depth=settings.depth or octree_depth(points, settings.cell_m),
-        scale=_SCALE,
+        scale=SCALE,
         linear_fit=settings.linear_fit,
         n_threads=1,  # what several find differs from run to run by the last bits
         full_depth=settings.full_depth,
@@ -79,5 +80,5 @@ def poisson(oriented: OrientedCloud, settings: Settings) -> Mesh:
 
 def octree_depth(points: np.ndarray, cell_m: float) -> int:
     """The least depth whose cells are no wider than ``cell_m``, from 6 to 12."""
-    side_m = _SCALE * float(np.ptp(points, axis=0).max())
+    side_m = SCALE * float(np.ptp(points, axis=0).max())
     return int(np.clip(np.ceil(np.log2(side_m / cell_m) - 0.25), 6, 12))
