@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+from math import pow
+
 SPLIT = " part "
 """Between the name of a stage and the part of a room that a task does of it."""
 
-#: Seconds a megabyte of scan, as the demo's rooms of 13 to 23 MB took on one core; 0.02 for a
-#: stage not named.
+#: Seconds a megabyte of scan on one core, as the demo's rooms of 20 MB took; 0.02 for a stage not
+#: named.
 _SECONDS = {
     "ownership": 0.3, "register": 0.28, "sift": 0.24, "exposure": 0.14, "spacing": 0.02,
     "normals": 0.27, "surface": 1.15, "trim": 0.28, "hygiene": 0.1, "levels": 0.18, "tiles": 0.04,
     "unwrap": 0.55, "floors": 0.19, "colors": 0.12, "bake": 0.45, "inferred": 0.05, "pack": 0.07,
     "poster": 0.1, "measure": 0.08,
 }  # fmt: skip
+#: Stages that work on the surface, which grows less than the scan: its detail has an end.
+_OF_THE_SURFACE = {
+    "surface", "trim", "hygiene", "levels", "tiles", "unwrap", "floors", "bake", "pack", "poster",
+    "measure",
+}  # fmt: skip
+_USUAL_MB, _GROWTH = 20.0, 0.66
 #: Stages that leave cores idle: most of their work is of the kind that one thread must do.
 _ON_ONE_CORE = {"surface", "trim", "hygiene", "levels"}
 #: Peak megabytes a megabyte of scan, beyond those of a process at rest: a room of 228 MB.
-_MEMORY = {"sift": 15, "surface": 30, "trim": 16, "colors": 20, "exposure": 10}
+_MEMORY = {"sift": 9, "surface": 12, "trim": 10, "levels": 9, "colors": 10}
 _REST_MB = 300
 
 
@@ -38,9 +46,12 @@ def leaves_cores(name: str) -> bool:
 
 def expected_s(name: str, scan_mb: float) -> float:
     """Seconds that a task takes on one core."""
-    return _SECONDS.get(stage_of(name), 0.02) * scan_mb / parts_of(name)
+    stage = stage_of(name)
+    growth = _GROWTH if stage in _OF_THE_SURFACE else 1.0
+    seconds = _SECONDS.get(stage, 0.02) * _USUAL_MB * pow(scan_mb / _USUAL_MB, growth)
+    return seconds / parts_of(name)
 
 
 def expected_mb(name: str, scan_mb: float) -> float:
     """Megabytes of memory that a task takes at its peak."""
-    return _REST_MB + _MEMORY.get(stage_of(name), 8) * scan_mb / parts_of(name)
+    return _REST_MB + _MEMORY.get(stage_of(name), 6) * scan_mb / parts_of(name)

@@ -48,6 +48,25 @@ def grouped(number: Ints) -> tuple[Ints, Ints]:
     return order, _starts(number, order)
 
 
+def means(values: npt.NDArray[np.generic], order: Ints, starts: Ints) -> Float32:
+    """(v, k) the mean of (n, k) values over each group of ``grouped``."""
+    mean = np.empty((len(starts), values.shape[1]), np.float32)
+    _average(values, order, np.append(starts, len(order)), mean)
+    return mean
+
+
+@compiled
+def _average(values: npt.NDArray[np.generic], order: Ints, ends: Ints, mean: Float32) -> None:
+    """Write the mean of each group, summed in double precision."""
+    total = np.empty(values.shape[1])
+    for group in range(len(ends) - 1):
+        total[:] = 0
+        for i in range(ends[group], ends[group + 1]):
+            for k in range(len(total)):
+                total[k] += values[order[i], k]
+        mean[group] = total / (ends[group + 1] - ends[group])
+
+
 @compiled
 def _numbers(points: Float32, low: Float32, voxel_m: np.float32, shape: Ints) -> Ints:
     number = np.empty(len(points), np.int64)

@@ -260,6 +260,18 @@ def test_levels_have_the_faces_asked_for_and_stay_near(trimmed: Mesh) -> None:
         assert np.quantile(distance, 0.95) < near_m
 
 
+def test_blocks_leave_no_crack_where_they_met(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(levels, "_BLOCK_FACES", 10_000)
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=2.0)
+    mesh = Mesh(np.zeros(3), ball.vertices.astype(np.float32), ball.faces.astype(np.int32))
+    finest = levels.levels(mesh, levels.Settings(0.06, root_faces=400)).finest
+    assert 3_400 < len(finest.faces) < 3_700
+    assert trimesh.Trimesh(finest.vertices, finest.faces, process=False).is_watertight
+    off_m = np.abs(np.linalg.norm(finest.vertices, axis=1) - 2)
+    assert np.quantile(off_m, 0.95) < 0.004
+    assert off_m.max() < 0.01
+
+
 def test_quality_tells_distance_and_what_is_inferred(oriented: OrientedCloud) -> None:
     shell = trimesh.creation.box((4, 4.8, 2.5))
     shell.apply_translation((0, 0, 1.25))

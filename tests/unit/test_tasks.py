@@ -211,6 +211,40 @@ def test_tasks_that_wait_for_nothing_run_at_once(tmp_path: Path) -> None:
     assert counting.shares == [[4], [1, 1, 2], [4]]
 
 
+def test_what_little_depends_on_runs_where_cores_idle(tmp_path: Path) -> None:
+    """Exposure waits for the surface, which works on one core, and the normals get both."""
+    told: list[str] = []
+    starts: list[tuple[str, int]] = []
+
+    class Two:
+        most, threads = 2, 2
+
+        def __init__(self) -> None:
+            self.open: list[Future[Any]] = []
+
+        def submit(self, function: Any, /, *arguments: Any) -> Future[Any]:
+            starts.append((told[-1], arguments[-1]))
+            future: Future[Any] = Future()
+            self.open.append(future)
+            function(*arguments)
+            if told[-1] != "surface":  # it lasts until something runs beside it
+                for each in self.open:
+                    each.set_result(None)
+                self.open.clear()
+            return future
+
+        def died(self, _: BaseException, /) -> bool:
+            return False
+
+    scan = task("scan", lambda: 1, version=1)
+    normals = task("normals", lambda n: n, scan, version=1)
+    exposure = task("exposure", lambda n: n, scan, version=1)
+    surface = task("surface", lambda n: n, normals, version=1)
+    wanted = {"room": RoomTasks((surface, exposure), 20.0)}
+    run_missing(wanted, Cache(tmp_path), Two(), lambda _, stage, __: told.append(stage))
+    assert starts == [("scan", 2), ("normals", 2), ("surface", 2), ("exposure", 1)]
+
+
 def test_a_plan_says_why(tmp_path: Path) -> None:
     cache = Cache(tmp_path)
     before = {each.name: each.ingredients for each in in_order(recipe(9))}

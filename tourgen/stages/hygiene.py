@@ -52,10 +52,15 @@ def hygiene(mesh: Mesh, settings: Settings) -> Mesh:
     """
     import trimesh
 
-    keep = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).unique_faces()
+    def among(chosen: npt.NDArray[np.int64]) -> trimesh.Trimesh:
+        return trimesh.Trimesh(mesh.vertices, mesh.faces[chosen], process=False)
+
+    keep = np.ones(len(mesh.faces), np.bool_)
+    # Of two at the same place, each has an edge with more, or both are a crumb.
+    crowded = np.flatnonzero(_crowded(*edge_faces(mesh.faces), len(keep)))
+    keep[crowded] = among(crowded).unique_faces()
     small = np.flatnonzero(face_areas(mesh) < _SUSPECT_M2)
-    suspects = trimesh.Trimesh(mesh.vertices, mesh.faces[small], process=False)
-    keep[small] &= suspects.nondegenerate_faces()
+    keep[small] &= among(small).nondegenerate_faces()
     mesh = _without_overfull_edges(compact(mesh, keep))
     mesh = compact(mesh, _large_enough(mesh, settings))
     if not len(mesh.faces):
@@ -86,6 +91,19 @@ def _without_overfull_edges(mesh: Mesh) -> Mesh:
     """Drop the smallest faces of each edge that more than two faces share."""
     starts, high, owner = edge_faces(mesh.faces)
     return compact(mesh, ~_overfull(starts, high, owner, face_areas(mesh)))
+
+
+@compiled
+def _crowded(
+    starts: npt.NDArray[np.int64], high: Int32, owner: Int32, count: int
+) -> npt.NDArray[np.bool_]:
+    """(count,) faces of an edge that has more than two."""
+    found = np.zeros(count, np.bool_)
+    for i in range(len(starts) - 1):
+        for place in range(starts[i], starts[i + 1] - 2):  # those of one edge stand in a row
+            if high[place] == high[place + 2]:
+                found[owner[place]] = found[owner[place + 1]] = found[owner[place + 2]] = True
+    return found
 
 
 @compiled

@@ -1,7 +1,9 @@
 """Levels: the room's finest mesh, and the coarse one that shows it at once.
 
 Both are simplified over the whole room by fast-simplification (quadric error metric, Garland and
-Heckbert 1997). The levels between are made tile by tile in ``tiles``, with locked borders.
+Heckbert 1997). Where a room has many more faces than are wanted, most of them go block by block
+before, with locked borders: a face at work takes half a kilobyte. The levels between are made tile
+by tile in ``tiles``.
 """
 
 from __future__ import annotations
@@ -11,9 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tourgen.geometry import Mesh
-from tourgen.stages.mesh_arrays import face_areas, on_grid
+from tourgen.stages.halving import halved
+from tourgen.stages.mesh_arrays import compact, face_areas, on_grid, weld
 
-VERSION = 2
+VERSION = 3
+_BLOCK_FACES = 1_000_000
+_LEFT = 2.0
+"""Faces that blocks leave, over those that are wanted in the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +57,30 @@ def levels(mesh: Mesh, settings: Settings) -> Levels:
 
 
 def _simplify(mesh: Mesh, faces: int) -> Mesh:
-    import fast_simplification
-
     if len(mesh.faces) <= faces:
         return on_grid(mesh)
-    vertices, triangles = fast_simplification.simplify(
-        mesh.vertices, mesh.faces, target_count=faces, agg=5
+    if len(mesh.faces) > max(_BLOCK_FACES, 2 * _LEFT * faces):
+        mesh = _by_blocks(mesh, _LEFT * faces / len(mesh.faces))
+    return on_grid(_simplified(mesh, faces))
+
+
+def _by_blocks(mesh: Mesh, share: float) -> Mesh:
+    """Leave about a share of the faces."""
+    count = -(-len(mesh.faces) // _BLOCK_FACES)
+    block = halved(mesh, count)
+    return weld(
+        [
+            _simplified(each, int(share * len(each.faces)), preserve_border=True)
+            for number in range(count)
+            for each in (compact(mesh, block == number),)
+        ]
     )
-    return on_grid(Mesh(mesh.origin, vertices.astype(np.float32), triangles.astype(np.int32)))
+
+
+def _simplified(mesh: Mesh, faces: int, *, preserve_border: bool = False) -> Mesh:
+    import fast_simplification
+
+    vertices, triangles = fast_simplification.simplify(
+        mesh.vertices, mesh.faces, target_count=faces, agg=5, preserve_border=preserve_border
+    )
+    return Mesh(mesh.origin, vertices.astype(np.float32), triangles.astype(np.int32))

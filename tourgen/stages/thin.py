@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tourgen.geometry import PointCloud
-from tourgen.voxels import voxel_groups
+from tourgen.voxels import means, voxel_groups
 
-VERSION = 2
+VERSION = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,12 +39,9 @@ def thin(cloud: PointCloud, settings: Settings) -> PointCloud:
         Mean positions and colours; the station is that of one of the voxel's points.
     """
     order, starts = voxel_groups(cloud.points, settings.voxel_m)
-    count = np.diff(np.append(starts, len(order)))[:, None]
-    points = np.add.reduceat(cloud.points[order], starts, axis=0, dtype=np.float64) / count
-    colors = np.add.reduceat(cloud.colors[order], starts, axis=0, dtype=np.float32) / count
     return PointCloud(
         cloud.origin,
-        points.astype(np.float32),
-        np.rint(colors).astype(np.uint8),
+        means(cloud.points, order, starts),
+        np.rint(means(cloud.colors, order, starts)).astype(np.uint8),
         cloud.station[order[starts]],
     )

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from tourgen.geometry import Mesh, Tile
 from tourgen.rays import ray_scene
+from tourgen.stages.halving import halved
 from tourgen.stages.levels import Levels
 from tourgen.stages.mesh_arrays import compact, components, face_adjacency, on_grid, weld
 
@@ -65,23 +66,8 @@ def tiles(levels: Levels, settings: Settings) -> tuple[Tile, ...]:
 
 
 def _leaf_meshes(finest: Mesh, count: int) -> list[Mesh]:
-    """Bisect the faces along the longest axis; leaves that are near are near in the list."""
-    centre = finest.vertices[finest.faces].mean(axis=1)
-    label = np.empty(len(centre), np.int64)
-
-    def bisect(faces: npt.NDArray[np.int64], first: int, last: int) -> None:
-        if last - first == 1:
-            label[faces] = first
-            return
-        middle = (first + last) // 2
-        at = centre[faces]
-        order = np.argsort(at[:, np.argmax(np.ptp(at, axis=0))], kind="stable")
-        cut = len(faces) * (middle - first) // (last - first)
-        bisect(faces[order[:cut]], first, middle)
-        bisect(faces[order[cut:]], middle, last)
-
-    bisect(np.arange(len(centre)), 0, count)
-    label = _without_islands(label, finest)
+    """Leaves that are near are near in the list."""
+    label = _without_islands(halved(finest, count), finest)
     return [compact(finest, faces) for i in range(count) if (faces := label == i).any()]
 
 

@@ -37,7 +37,7 @@ __all__ = [
     "vistas",
 ]
 
-VERSION = 11
+VERSION = 12
 
 
 def bake(

@@ -31,7 +31,7 @@ from tourgen.geometry import Float32, OrientedCloud, PointCloud, UInt8
 from tourgen.neighbours import Grid, Neighbours, nearest_to
 from tourgen.stages.bake.texels import Texels, to_bytes, unit
 from tourgen.threads import in_parts
-from tourgen.voxels import grouped, voxels
+from tourgen.voxels import grouped, means, voxels
 
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
@@ -163,13 +163,7 @@ def _averaged(
 ) -> tuple[Float32, ...]:
     """The mean of each value over the points of one cell and one kind."""
     order, starts = grouped(voxels(points, cell_m)[0] * 6 + kind)
-    counts = np.diff(starts, append=len(order)).astype(np.float32)[:, None]
-    return tuple(
-        (np.add.reduceat(value[order].astype(np.float32), starts, axis=0) / counts).astype(
-            np.float32
-        )
-        for value in values
-    )
+    return tuple(means(value, order, starts) for value in values)
 
 
 def _facing(normals: Float32) -> Int64:

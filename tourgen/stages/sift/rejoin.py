@@ -61,7 +61,8 @@ def rejoined(
             break
         rest = np.flatnonzero(~back)
         own = points[at[rest]]
-        index, distance = Neighbours.of(kept, _NEIGHBOURS).nearest(own, _NEIGHBOURS)
+        around = Neighbours.of(kept, _NEIGHBOURS)
+        index, distance = around.nearest(own, _NEIGHBOURS, float(reach_m.max()))
         fits = distance[:, 0] < near_m
         wide = distance[:, -1] < reach_m[rest]
         fits[wide] |= _on_surface(

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from tourgen.geometry import Float32, Mesh, OrientedCloud, PointCloud
+from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud, PointCloud
 from tourgen.neighbours import Neighbours
 from tourgen.rays import ray_scene
 from tourgen.stages.mesh_arrays import face_areas, vertex_normals
@@ -84,10 +84,9 @@ def auto(oriented: OrientedCloud, settings: Settings) -> Chosen:
     shapes = signed_distance.shapes(oriented, settings.distance)
     planes = shapes.planes
     known = signed_distance.distances(planes, settings.distance)
-    dense = known.zero_set(oriented.cloud.origin, sharp=False)
-    if not len(dense.faces):
+    solved = _solved(known, oriented.cloud.origin, settings)
+    if solved is None:
         return Chosen(poisson.poisson(oriented, settings.alone), 0.0)
-    solved = poisson.poisson(_evenly(dense, settings), settings.solve)
     reach_m = settings.distance.reach * settings.distance.spacing_m
     near = _near(solved, planes, reach_m)
     if _share(solved, near) < settings.least_share:
@@ -95,6 +94,12 @@ def auto(oriented: OrientedCloud, settings: Settings) -> Chosen:
     mesh = known.carried_on(_Closed(solved, ~near)).zero_set(oriented.cloud.origin)
     share = _share(mesh, _near(mesh, planes, reach_m))
     return Chosen(shapes.with_rods(mesh, settings.distance), share)
+
+
+def _solved(known: signed_distance.Distances, origin: Float64, settings: Settings) -> Mesh | None:
+    """The solve from the surface that the distance draws; None where it draws none."""
+    dense = known.zero_set(origin, sharp=False)
+    return poisson.poisson(_evenly(dense, settings), settings.solve) if len(dense.faces) else None
 
 
 def _evenly(mesh: Mesh, settings: Settings) -> OrientedCloud:

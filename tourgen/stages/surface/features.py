@@ -30,11 +30,21 @@ Mask = npt.NDArray[np.bool_]
 
 def fans(loops: Int32) -> Int32:
     """(f, 3) faces of (l, 7) loops, each a fan from its first vertex; -1 ends a loop."""
-    found = [np.empty((0, 3), np.int32)]
-    for last in range(2, loops.shape[1]):
-        some = loops[loops[:, last] >= 0]
-        found.append(some[:, [0, last - 1, last]])
-    return np.concatenate(found)
+    faces = np.empty(((loops[:, 2:] >= 0).sum(), 3), np.int32)
+    _fan(loops, faces)
+    return faces
+
+
+@compiled
+def _fan(loops: Int32, faces: Int32) -> None:
+    found = 0
+    for i in range(len(loops)):
+        for last in range(2, loops.shape[1]):
+            if loops[i, last] < 0:
+                break
+            faces[found, 0] = loops[i, 0]
+            faces[found, 1], faces[found, 2] = loops[i, last - 1], loops[i, last]
+            found += 1
 
 
 def with_features(

@@ -101,10 +101,20 @@ def marching_cubes(
     return Mesh(origin, vertices[used], faces)
 
 
-def find(key: Keys, wanted: Keys) -> Int32:
-    """Position of each sorted key among the sorted ones, -1 where it is not there."""
-    at = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
-    return np.where(key[at] == wanted, at, -1).astype(np.int32)
+@compiled
+def beside(key: Keys, chosen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """(n,) which of (n,) sorted corners lie within a cell of a chosen one, these included."""
+    found = np.zeros(len(key), np.bool_)
+    for way in AROUND:
+        j = 0
+        for i in range(len(key)):
+            if not chosen[i]:
+                continue
+            while j < len(key) and key[j] < key[i] + way:
+                j += 1
+            if j < len(key) and key[j] == key[i] + way:
+                found[j] = True
+    return found
 
 
 @compiled
@@ -188,16 +198,53 @@ def _vertices(
     key: Keys, value: Float32, after: Int32, low: Float32, cell_m: float
 ) -> tuple[Int32, Float32]:
     """(n, 3) number of the vertex on the edge from each corner along each axis, and (v, 3)."""
-    behind = value <= 0
-    cut = (after >= 0) & (behind[:, None] != behind[after])
-    cut &= ~(np.isnan(value)[:, None] | np.isnan(value)[after])
-    number = np.cumsum(cut, dtype=np.int32).reshape(cut.shape) - 1
-    corner, axis = np.nonzero(cut)
-    here, there = value[corner], value[after[corner, axis]]
-    share = np.clip(here / (here - there), _LEAST_SHARE, 1 - _LEAST_SHARE)
-    vertices = corner_of(key[corner]).astype(np.float32)
-    vertices[np.arange(len(corner)), axis] += share
-    return number, vertices * np.float32(cell_m) + low
+    number = np.empty(after.shape, np.int32)
+    vertices = np.empty((_count_crossed(value, after, number), 3), np.float32)
+    _place(key, value, after, number, low, np.float32(cell_m), vertices)
+    return number, vertices
+
+
+@compiled
+def _count_crossed(value: Float32, after: Int32, number: Int32) -> int:
+    """Write the number of the vertex on each edge, -1 where the surface does not cross it."""
+    count = 0
+    for i in range(len(value)):
+        for axis in range(3):
+            j = after[i, axis]
+            number[i, axis] = -1
+            if j < 0 or np.isnan(value[i]) or np.isnan(value[j]):
+                continue
+            if (value[i] <= 0) != (value[j] <= 0):
+                number[i, axis] = count
+                count += 1
+    return count
+
+
+@compiled
+def _place(
+    key: Keys,
+    value: Float32,
+    after: Int32,
+    number: Int32,
+    low: Float32,
+    cell_m: np.float32,
+    vertices: Float32,
+) -> None:
+    """Write where the vertices lie."""
+    mask = (1 << AXIS_BITS) - 1
+    at = np.empty(3, np.float32)
+    for i in range(len(value)):
+        at[0] = key[i] >> 2 * AXIS_BITS
+        at[1] = key[i] >> AXIS_BITS & mask
+        at[2] = key[i] & mask
+        for axis in range(3):
+            if number[i, axis] < 0:
+                continue
+            here, there = value[i], value[after[i, axis]]
+            share = min(max(here / (here - there), _LEAST_SHARE), 1 - _LEAST_SHARE)
+            for k in range(3):
+                place = at[k] + np.float32(share) if k == axis else at[k]
+                vertices[number[i, axis], k] = place * cell_m + low[k]
 
 
 def _used(faces: Int32, count: int) -> tuple[npt.NDArray[np.bool_], Int32]:

@@ -76,7 +76,7 @@ def rods(
         The rods, and the mask of the points that are theirs.
     """
     at = np.flatnonzero(rest)
-    tree = cKDTree(raw)
+    tree = cKDTree(raw, compact_nodes=False, balanced_tree=False)  # asked for a few places only
     taken = np.zeros(len(raw), bool)
 
     def crowding(rod: Rod, members: Ints) -> float:

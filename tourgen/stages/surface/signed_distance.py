@@ -53,9 +53,8 @@ from tourgen.stages.surface.field import Field
 from tourgen.stages.surface.flats import flattened
 from tourgen.stages.surface.growing import grown
 from tourgen.stages.surface.marching_cubes import (
-    AROUND,
     Keys,
-    find,
+    beside,
     marching_cubes,
     most_cells,
 )
@@ -256,8 +255,7 @@ class Distances:
             distance[rest] = trust[rest] * distance[rest] + (1 - trust[rest]) * theirs
             return distance
 
-        rim = find(self.key, self.key[np.isnan(self.value)][:, None] + AROUND)
-        rim = np.unique(rim[rim >= 0])
+        rim = np.flatnonzero(beside(self.key, np.isnan(self.value)))
         value = self.value.copy()
         value[rim] = told(self.key[rim])
         seeds = np.concatenate([field.seeds, field.cells(beyond.seeds)])
