@@ -4,7 +4,7 @@ Whole processes, one after the other in one run: ``tourgen build`` without a cac
 that are made by hand (``by_hand``), of the demo's first chamber scanned to each number of points.
 The chains solve at the two depths whose cells are next to the detail that tourgen chose, wider and
 narrower, and end with as many faces; beside the time stands how true each is, so that nobody wins
-by doing less.
+by doing less. What was measured is kept beside the docs, so that sizes may be run one by one.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import json
 import shutil
 import sys
 import tomllib
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,10 @@ POINTS = (130_000, 1_300_000, 15_200_000)
 MOST_S, MOST_MB = 3600.0, 20_000.0
 CHAINS = ("meshlab", "open3d")
 HEADING = "Time and memory"
+STAGES = """Where tourgen's time goes: seconds from each stage's start to its end; some run beside
+others.
+"""
+_LEAST_S = 1.0
 AROUND_M = 0.1
 PREAMBLE = """Made by `make bench-speed`: whole processes in one run, without a cache. `meshlab`
 and `open3d` are what one does by hand (`tests/peers/by_hand.py`): crop, normals, screened Poisson
@@ -57,17 +62,31 @@ def main() -> int:
     parser.add_argument("--demo", type=Path, default=Path("sites/lighthouse"))
     parser.add_argument("--write", type=Path, help="write the section of this Markdown file")
     given = parser.parse_args()
-    rows = []
     for points in given.points or POINTS:
-        rows += compared(points, given)
+        rows, seconds = compared(points, given)
         print(markdown(rows), flush=True)
         if given.write:
-            rewrite(given.write, HEADING, f"{PREAMBLE}\n{markdown(rows)}")
+            kept = given.write.parent / "speed"
+            kept.mkdir(exist_ok=True)
+            told = json.dumps({"rows": rows, "stages": seconds}, indent=1)
+            (kept / f"{points}.json").write_text(f"{told}\n", encoding="utf-8")
+            _write(kept, given.write)
     return 0
 
 
-def compared(points: int, given: argparse.Namespace) -> list[dict[str, Any]]:
-    """A row for tourgen and for each chain."""
+def _write(kept: Path, docs: Path) -> None:
+    """Write the docs' section, each size as it was last measured."""
+    files = sorted(kept.glob("*.json"), key=lambda file: int(file.stem))
+    found = {int(file.stem): json.loads(file.read_text("utf-8")) for file in files}
+    rows = [row for each in found.values() for row in each["rows"]]
+    stages = {points: each["stages"] for points, each in found.items()}
+    rewrite(docs, HEADING, f"{PREAMBLE}\n{markdown(rows)}\n\n{STAGES}\n{stage_table(stages)}")
+
+
+def compared(
+    points: int, given: argparse.Namespace
+) -> tuple[list[dict[str, Any]], dict[str, float]]:
+    """A row for tourgen and for each chain; the seconds of tourgen's stages."""
     tour = given.scratch.resolve() / f"{points}"
     _scanned(points, tour, given.demo)
     truth = Truth(tour / "truth", ROOM)
@@ -77,7 +96,7 @@ def compared(points: int, given: argparse.Namespace) -> list[dict[str, Any]]:
 
     def row(name: str, usage: Usage, mesh: Path) -> dict[str, Any]:
         print(f"{points}: {name}: {usage.wall_s:.0f} s, {usage.peak_mb:.0f} MB", flush=True)
-        told: dict[str, Any] = {"points": points, "program": name, "usage": usage}
+        told: dict[str, Any] = {"points": points, "program": name, **asdict(usage)}
         if not usage.failed:
             found = load(mesh)
             told |= surface_figures(*found, Samples.of(*found, truth), reference)
@@ -103,7 +122,7 @@ def compared(points: int, given: argparse.Namespace) -> list[dict[str, Any]]:
         command += ["--eye", *map(str, eye), "--depth", str(depth)]
         command += ["--faces", str(report["faces"][-1])]
         rows.append(row(name, run(out.name, *command), out / "mesh.ply"))
-    return rows
+    return rows, report["seconds"]
 
 
 def _scanned(points: int, tour: Path, demo: Path) -> None:
@@ -141,21 +160,40 @@ def markdown(rows: list[dict[str, Any]]) -> str:
         "| points | program | s | times | processor s | peak MB | faces | F 5 mm | p95 mm |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    ours = {each["points"]: each["usage"].wall_s for each in rows if each["program"] == "tourgen"}
+    ours = {each["points"]: each["wall_s"] for each in rows if each["program"] == "tourgen"}
     for each in rows:
-        usage = each["usage"]
         start = f"| {each['points']:,} | {each['program']} "
-        if usage.failed:
-            lines.append(
-                f"{start}| {usage.failed.splitlines()[0]} | | | {usage.peak_mb:,.0f} | | | |"
-            )
+        if each["failed"]:
+            why = each["failed"].splitlines()[0]
+            lines.append(f"{start}| {why} | | | {each['peak_mb']:,.0f} | | | |")
             continue
         lines.append(
-            f"{start}| {usage.wall_s:.0f} | {usage.wall_s / ours[each['points']]:.2f} "
-            f"| {usage.processor_s:.0f} | {usage.peak_mb:,.0f} | {each['faces']:,} "
+            f"{start}| {each['wall_s']:.0f} | {each['wall_s'] / ours[each['points']]:.2f} "
+            f"| {each['processor_s']:.0f} | {each['peak_mb']:,.0f} | {each['faces']:,} "
             f"| {each['f_score_5mm']:.3f} | {each['accuracy_p95_mm']:.2f} |"
         )
     return "\n".join(lines)
+
+
+def stage_table(stages: dict[int, dict[str, float]]) -> str:
+    """Seconds of each stage that takes one at least, by the number of points."""
+    names = [
+        name
+        for name in next(iter(stages.values()))
+        if any(each.get(name, 0) >= _LEAST_S for each in stages.values())
+    ]
+    return "\n".join(
+        [
+            "| stage | " + " | ".join(f"{points:,}" for points in stages) + " |",
+            "|---|" + "---|" * len(stages),
+            *(
+                f"| {name} | "
+                + " | ".join(f"{each.get(name, 0):.1f}" for each in stages.values())
+                + " |"
+                for name in names
+            ),
+        ]
+    )
 
 
 if __name__ == "__main__":
