@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -169,6 +171,19 @@ def test_the_rim_of_a_lampshade_is_no_rod() -> None:
     up = np.stack([0.6 * np.cos(turn), 0.6 * np.sin(turn), np.ones(len(turn))], axis=1)
     told = planes_of(np.concatenate([points, glass]), np.concatenate([normals, up]))
     assert not rods(told, told.points, np.ones(len(told.points), bool), SPACING_M)[0]
+
+
+def test_two_dense_rows_of_beams_on_a_board_are_no_rod() -> None:
+    """A board whose rows lie far apart, and two near each other through which a tube would fit."""
+    rng = np.random.default_rng(5)
+    rows, along = np.meshgrid(np.arange(-0.165, 0.17, 0.055), np.arange(0, 2, 0.022))
+    board = np.stack([rows.ravel(), along.ravel()], axis=1)
+    row = np.stack([rng.choice([-0.0055, 0.0055], 400), np.linspace(0, 2, 400)], axis=1)
+    flat = np.concatenate([board, row])
+    points = np.column_stack([flat, rng.normal(0, NOISE_M, len(flat))])
+    told = planes_of(points, np.tile([0.0, 0, 1], (len(points), 1)))
+    told = replace(told, spacing_m=np.repeat(np.float32([0.039, 0.02]), [len(board), len(row)]))
+    assert not rods(told, told.points, np.ones(len(points), bool), SPACING_M)[0]
 
 
 def test_tubes_are_closed_and_look_outward() -> None:

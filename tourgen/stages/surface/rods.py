@@ -55,6 +55,9 @@ _STRAYS = 0.1
 """The part of the points at one place that may be others, and do not crowd it."""
 _GAP = 6.0
 """Longest stretch without a point, in spacings."""
+_FLANK, _FLANK_M = 2.0, 0.08
+"""How far aside a row of points on a surface has others on it, in the spacing of these; at most."""
+_FLANK_STEP_M = 0.04
 
 Mask = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
@@ -89,6 +92,8 @@ def rods(
         own = at[stick]
         own = own[~taken[own]]
         if len(own) < _POINTS or crowding(_outline(raw[own]), own) > _HOPELESS:
+            continue
+        if _is_flanked(planes, raw, own, tree):
             continue
         found = _straight(planes, raw, at, own, spacing_m) or _bent(
             planes, raw, at[~taken[at]], own, spacing_m
@@ -295,6 +300,31 @@ def _crowding(rod: Rod, tree: cKDTree, of_rods: Mask, spacing_m: float) -> float
     beside = tree.query_ball_point(rod.places(steps), rod.radius_m + spacing_m / 2)
     crowded = [(~of_rods[each]).sum() > _STRAYS * np.size(each) for each in beside]
     return float(np.mean(crowded))
+
+
+def _is_flanked(planes: TangentPlanes, raw: Float32, own: Ints, tree: cKDTree) -> bool:
+    """Whether along most of a stick others lie on both sides of it, on one surface with it.
+
+    Then it is a row of beams that fell on a wall where all others lie far apart: on a board that a
+    station sees at a grazing angle, 2 m long and 20 mm from the next row, it came out as a tube.
+    """
+    middle = raw[own].mean(axis=0)
+    along = np.linalg.svd(raw[own] - middle, full_matrices=False)[2][0]
+    normal = planes.normals[own].mean(axis=0)
+    normal -= (normal @ along) * along
+    normal /= max(float(np.linalg.norm(normal)), 1e-9)
+    reach = (raw[own] - middle) @ along
+    steps = np.arange(reach.min(), reach.max(), _FLANK_STEP_M)
+    near = tree.query_ball_point(middle + steps[:, None] * along, _FLANK_M)
+    around = np.setdiff1d(np.concatenate(near).astype(np.int64), own)
+    apart = raw[around] - middle
+    aside = apart @ np.cross(along, normal)
+    on = np.abs(apart @ normal) < ON * planes.noise_m
+    on &= np.abs(aside) < _FLANK * planes.spacing_m[around]
+    place = np.floor((apart @ along - reach.min()) / _FLANK_STEP_M).astype(np.int64)
+    on &= (place >= 0) & (place < len(steps))
+    sides = [np.bincount(place[on & (way * aside > 0)], minlength=len(steps)) for way in (1, -1)]
+    return bool(np.minimum(*sides).astype(bool).mean() > _HOPELESS)
 
 
 def _beside(rod: Rod, points: Float32, near_m: float) -> Mask:
