@@ -16,6 +16,7 @@ HIGHEST_DEG = 75.0
 """Windows nearer the zenith hold all azimuths."""
 _SAMPLE = 600_000
 _LARGEST_SAMPLE = 6_000_000
+_SEVERAL = 10
 _LEAST_STEPS = 4
 """Of a grid in a window: less is its own width."""
 
@@ -95,12 +96,12 @@ def windows_about(
 
 
 def drawn(count: int, wanted: int, rng: np.random.Generator) -> npt.NDArray[np.int64]:
-    """Positions of about so many of ``count`` points, rising; all of them where they are fewer.
+    """Positions of so many of ``count`` points, or of nearly so many; all where they are fewer.
 
     A permutation of 150 million would take more than a gigabyte.
     """
-    if wanted >= count:
-        return np.arange(count)
+    if wanted > count / _SEVERAL:
+        return rng.permutation(count)[:wanted]
     return np.unique(rng.integers(0, count, wanted))
 
 
