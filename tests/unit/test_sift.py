@@ -295,6 +295,12 @@ def test_a_ghost_beside_its_mirror_does_not_widen_it() -> None:
     assert mirror.hides(station, through.astype(np.float32), 0.05).tolist() == [True, False, False]
 
 
+@pytest.mark.parametrize("count", [0, 3, 39])
+def test_a_handful_of_ghosts_makes_no_mirror(count: int) -> None:
+    crossing = np.random.default_rng(0).uniform(-0.01, 0.01, (count, 3))
+    assert outlined(np.array([0.0, 1, 0]), np.zeros(3), crossing) is None
+
+
 @pytest.mark.parametrize("case", ["far away", "one spot", "one far off"])
 def test_a_picture_has_few_cells_for_each_point(case: str) -> None:
     rng = np.random.default_rng(0)
