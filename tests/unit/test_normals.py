@@ -122,3 +122,15 @@ def test_stations_that_see_through_a_sparse_surface_are_not_believed() -> None:
     )
     assert seen.mean() > 0.95
     assert contradicted > normals.Settings().contradicted
+
+
+def test_a_station_in_the_plane_of_a_wall_does_not_tell_its_side() -> None:
+    """Its beams ran along the wall: what they met looks where what others met around it does."""
+    rows = wall([0, 0, 0], [2, 0, 0], [0, 0, 2], 0)
+    strip = wall([0.9, 0, 0], [0.01, 0, 0], [0, 0, 2], 1, 0.01) * [1, 0.1, 1]
+    both = cloud(np.concatenate([rows, strip]))
+    both.station[: len(rows)] = 0
+    both.station[len(rows) :] = 1
+    stations = np.array([[1.0, 2.0, 1.0], [-1.5, 0.0005, 1.0]])
+    oriented = normals.normals(both, stations, normals.Settings())
+    assert np.all(oriented.normals[:, 1] > 0)

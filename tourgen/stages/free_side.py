@@ -34,12 +34,14 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64
+from tourgen.neighbours import Neighbours
 from tourgen.rays import ray_scene, rays_of
 from tourgen.stages.tangent import across
 from tourgen.voxels import voxel_groups
 
 _PATCHES = 90_000
-_FINEST_M = 0.02
+PATCH_M = 0.02
+"""Edge of the smallest patches: much wider than noise, which turns what lies too near."""
 _RAYS = 4
 _NEIGHBOURS = 10
 _NEAR = 6.0
@@ -75,7 +77,7 @@ def face_free_space(points: Float32, normals: Float32, known: npt.NDArray[np.boo
         normals: (n, 3) unit, either side.
         known: (n,) mask of the normals that are right already, and stay.
     """
-    voxel_m = _FINEST_M
+    voxel_m = PATCH_M
     order, starts = voxel_groups(points, voxel_m)
     while len(starts) > _PATCHES:
         voxel_m *= 1.15
@@ -86,7 +88,7 @@ def face_free_space(points: Float32, normals: Float32, known: npt.NDArray[np.boo
     rays, lost = _rays(scene, place, normal, known[chosen], voxel_m)
     edges = _joined([rays, lost, _smoothness(place, normal)])
     normal = normal * _agreed(edges, known[chosen])[:, None]
-    _follow(points, normals, ~known, place, normal)
+    follow(points, normals, ~known, place, normal)
 
 
 def _rays(
@@ -190,21 +192,29 @@ def _agreed(edges: _Edges, known: npt.NDArray[np.bool_]) -> Float32:
     return side[:count].astype(np.float32)
 
 
-def _follow(
+def follow(
     points: Float32,
     normals: Float32,
     those: npt.NDArray[np.bool_],
     place: Float32,
     normal: Float32,
 ) -> None:
-    """Turn those normals as the patches around them are turned, in place."""
-    tree = cKDTree(place)
-    voters = np.arange(1, min(_VOTERS, len(place)) + 1)
+    """Turn some normals as those of the places around them are turned, in place.
+
+    Args:
+        points: (n, 3) metres.
+        normals: (n, 3) unit; is written.
+        those: (n,) mask of the normals to turn.
+        place: (m, 3) metres.
+        normal: (m, 3) unit, of the places.
+    """
+    voters = min(_VOTERS, len(place))
+    around = Neighbours.of(place, voters)
     left = np.flatnonzero(those)
     for start in range(0, len(left), 200_000):
         part = left[start : start + 200_000]
-        away, near = map(np.asarray, tree.query(points[part], k=voters, workers=-1))
+        near, away = around.nearest(points[part], voters)
         at, own = points[part][:, None], normals[part][:, None]
         alike = _likeness(at, own, place[near], normal[near])
-        votes = (alike / (away + 1e-4)).sum(axis=1)
+        votes = (alike / (away + PATCH_M)).sum(axis=1)
         normals[part[votes < 0]] *= -1
