@@ -16,11 +16,12 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, PointCloud, UInt8
+from tourgen.neighbours import Neighbours
 from tourgen.stages.burnt import burnt_out
 from tourgen.stages.cells import Cells, cells_of
 
 Bool = npt.NDArray[np.bool_]
-Int64 = npt.NDArray[np.int64]
+Int16 = npt.NDArray[np.int16]
 
 _DIRECTION_DEG = 1.0
 _WIDEST = 60
@@ -94,13 +95,13 @@ class _About:
         off_deg: (n,) angle to its middle, whole degrees.
     """
 
-    spot: Int64
-    off_deg: Int64
+    spot: Int16
+    off_deg: Int16
 
 
 def _about_burnt(cloud: PointCloud, burnt: Bool, stations: Float64, settings: Settings) -> _About:
     """About which spots the points of all stations lie."""
-    about = _About(np.full(len(cloud), -1), np.zeros(len(cloud), np.int64))
+    about = _About(np.full(len(cloud), -1, np.int16), np.zeros(len(cloud), np.int16))
     spots = 0
     for number, station in enumerate(stations):
         own = np.flatnonzero(cloud.station == number)
@@ -127,9 +128,9 @@ def _about_spots(way: Float32, burnt: Bool, settings: Settings) -> _About:
     count, spot = connected_components(touching, directed=False)
     summed = np.stack([np.bincount(spot, axis, count) for axis in seeds.data.T], axis=1)
     middles = summed / np.linalg.norm(summed, axis=1, keepdims=True)
-    spot_of = np.append(spot, -1)[nearest][of_cell].astype(np.int64)
+    spot_of = np.append(spot, -1)[nearest][of_cell].astype(np.int16)
     cosine = (way * middles[spot_of].astype(np.float32)).sum(axis=1)
-    return _About(spot_of, np.degrees(np.arccos(np.clip(cosine, -1, 1))).astype(np.int64))
+    return _About(spot_of, np.degrees(np.arccos(np.clip(cosine, -1, 1))).astype(np.int16))
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +195,7 @@ def _excess(seen: _Shades, where: _About, compared: Bool, settings: Settings) ->
     """
     rings = int(where.off_deg.max(initial=0)) + 1
     excess = np.zeros((int(where.spot.max(initial=0)) + 1, rings))
-    ring = where.spot * rings + where.off_deg
+    ring = where.spot.astype(np.int64) * rings + where.off_deg
     at = np.flatnonzero(compared)
     for each, count in zip(*np.unique(ring[at], return_counts=True), strict=True):
         if count >= settings.ring_cells:
@@ -227,7 +228,6 @@ def _near_lamps(
 def _take_surroundings(cloud: PointCloud, some: Bool, sound: Bool) -> None:
     """Give some points the mean colour of the sound ones next to them; in place."""
     if some.any() and sound.any():
-        _, near = cKDTree(cloud.points[sound]).query(
-            cloud.points[some], k=np.arange(1, min(_SURROUNDING_POINTS, int(sound.sum())) + 1)
-        )
+        count = min(_SURROUNDING_POINTS, int(sound.sum()))
+        near, _ = Neighbours.of(cloud.points[sound], count).nearest(cloud.points[some], count)
         cloud.colors[some] = np.rint(cloud.colors[sound][near].mean(1)).astype(np.uint8)

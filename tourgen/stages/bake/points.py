@@ -119,18 +119,14 @@ def color_index(cloud: PointCloud, oriented: OrientedCloud, finest_texel_m: floa
     if not len(cloud) or not len(oriented.cloud):
         raise StageError("bake: expected a cloud of at least 1 point, found 0")
     cell_m = finest_texel_m / 2
-    own = _normals(cloud, oriented)
-    points, normals, colors = _averaged(
-        cloud.points, _facing(own), cell_m, cloud.points, own, cloud.colors
-    )
-    normals = unit(normals)
+    points, normals, colors = _first_cells(cloud, oriented, cell_m)
     levels = [_level(cell_m, points, normals, colors)]
     while cell_m < _LARGEST_CELL_M:
         cell_m *= 2
-        fewer = _averaged(points, _facing(normals), cell_m, points, normals, colors)
+        fewer = _averaged(points, normals, colors, cell_m)
         if len(fewer[0]) > _FEWER * len(points) and cell_m < _LARGEST_CELL_M:
             continue  # these cells hold about one point each: the finer level tells as much
-        points, normals, colors = fewer[0], unit(fewer[1]), fewer[2]
+        points, normals, colors = fewer
         levels.append(_level(cell_m, points, normals, colors))
     return ColorIndex(tuple(levels))
 
@@ -158,18 +154,35 @@ def _level(cell_m: float, points: Float32, normals: Float32, colors: Float32) ->
     return Level(cell_m, around, normals[order], to_bytes(colors[order]))
 
 
+def _first_cells(
+    cloud: PointCloud, oriented: OrientedCloud, cell_m: float
+) -> tuple[Float32, Float32, Float32]:
+    """See ``_averaged``; apart, so that the points' own normals are gone when levels follow."""
+    return _averaged(cloud.points, _normals(cloud, oriented), cloud.colors, cell_m)
+
+
 def _averaged(
-    points: Float32, kind: Int64, cell_m: float, *values: npt.NDArray[np.generic]
-) -> tuple[Float32, ...]:
-    """The mean of each value over the points of one cell and one kind."""
-    order, starts = grouped(voxels(points, cell_m)[0] * 6 + kind)
-    return tuple(means(value, order, starts) for value in values)
+    points: Float32, normals: Float32, colors: npt.NDArray[np.generic], cell_m: float
+) -> tuple[Float32, Float32, Float32]:
+    """Mean point, unit normal and colour of the points of each cell that face the same way."""
+    key, _ = voxels(points, cell_m)
+    _face(normals, key)
+    order, starts = grouped(key)
+    del key
+    return (
+        means(points, order, starts),
+        unit(means(normals, order, starts)),
+        means(colors, order, starts),
+    )
 
 
-def _facing(normals: Float32) -> Int64:
-    """Which of six sides of a cube a normal leaves by, so that two sides of a board stay two."""
-    axis = np.abs(normals).argmax(1).astype(np.int64)
-    return np.asarray(axis * 2 + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0))
+@compiled
+def _face(normals: Float32, key: Int64) -> None:
+    """Put into each key by which of six sides of a cube a normal leaves: boards have two sides."""
+    for i in range(len(key)):
+        x, y, z = abs(normals[i, 0]), abs(normals[i, 1]), abs(normals[i, 2])
+        axis = 0 if x >= y and x >= z else 1 if y >= z else 2
+        key[i] = 6 * key[i] + 2 * axis + (1 if normals[i, axis] < 0 else 0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.compiled import compiled
-from tourgen.geometry import Float32, Float64
+from tourgen.geometry import Float32, Float64, Int32
 from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import components
 from tourgen.stages.surface.tangent_planes import TangentPlanes
@@ -175,19 +175,34 @@ def _neighbours(surfels: _Surfels, off_m: float) -> tuple[Ints, Ints, Float64]:
     points, normals = surfels.points, surfels.normals
     count = _NEIGHBOURS + 1
     near, _ = Neighbours.of(points, count).nearest(points, count, _REACH * surfels.edge_m)
-    first = np.repeat(np.arange(len(points)), _NEIGHBOURS)
-    second = near[:, 1:].ravel().astype(np.int64)
-    there = second >= 0
-    first, second = first[there], second[there]
-    turn = np.einsum("ij,ij->i", normals[first], normals[second])
-    between = points[second] - points[first]
-    off = np.abs(np.einsum("ij,ij->i", between, normals[first] + normals[second])) / 2
-    alike = (turn > _ALIKE) & (off < 2 * off_m)
-    first, second, turn = first[alike], second[alike], turn[alike]
-    number = np.bincount(first, minlength=len(points))
-    differ = np.bincount(first, 1 - turn, minlength=len(points))
-    calm = np.where(number > _NEIGHBOURS // 4, differ / np.maximum(number, 1), np.inf)
-    return first, second, calm
+    return _alike(points, normals, near[:, 1:], 2 * off_m)
+
+
+@compiled
+def _alike(
+    points: Float64, normals: Float64, near: Int32, most_m: float
+) -> tuple[Ints, Ints, Float64]:
+    """See ``_neighbours``; a loop, since whole arrays of pairs took most memory of a build."""
+    first, second = np.empty(near.size, np.int64), np.empty(near.size, np.int64)
+    calm = np.full(len(points), np.inf)
+    found = 0
+    for i in range(len(points)):
+        number, differ = 0, 0.0
+        for j in near[i]:
+            if j < 0:
+                break
+            turn = off = 0.0
+            for k in range(3):
+                turn += normals[i, k] * normals[j, k]
+                off += (points[j, k] - points[i, k]) * (normals[i, k] + normals[j, k])
+            if turn > _ALIKE and abs(off) / 2 < most_m:
+                first[found], second[found] = i, j
+                found += 1
+                number += 1
+                differ += 1 - turn
+        if number > _NEIGHBOURS // 4:
+            calm[i] = differ / number
+    return first[:found].copy(), second[:found].copy(), calm
 
 
 def _large(count: int, edge_m: float) -> bool:
@@ -375,7 +390,8 @@ def _moved(planes: TangentPlanes, surfels: _Surfels, flats: Flats) -> tuple[Tang
         return planes, replace(flats, of=np.full(len(planes.points), -1))
     around = Neighbours.of(surfels.points[lain], _AROUND)
     near, _ = around.nearest(planes.points, _AROUND, 1.5 * surfels.edge_m)
-    chosen, height = _nearest(planes, flats, np.append(flats.of[lain], -1)[near])
+    label = np.append(flats.of[lain], -1).astype(np.int32)
+    chosen, height = _nearest(planes, flats, label[near])
     on = np.flatnonzero(chosen >= 0)
     points, normals, support = planes.points.copy(), planes.normals.copy(), planes.support.copy()
     normals[on] = flats.normals[chosen[on]]
@@ -385,7 +401,7 @@ def _moved(planes: TangentPlanes, surfels: _Surfels, flats: Flats) -> tuple[Tang
     return moved, replace(flats, of=chosen)
 
 
-def _nearest(planes: TangentPlanes, flats: Flats, label: Ints) -> tuple[Ints, Float32]:
+def _nearest(planes: TangentPlanes, flats: Flats, label: Int32) -> tuple[Ints, Float32]:
     """Which of a few flats each tangent plane lies on, -1 for none, and how high over it.
 
     Args:

@@ -88,17 +88,25 @@ def marching_cubes(
         Faces counter-clockwise seen from where the value is positive; cells share vertices.
         No faces where nothing crosses zero.
     """
-    after = _next(key)
-    vertex_of, vertices = _vertices(key, value, after, low, cell_m)
-    asked = value, after, vertex_of, np.float32(steepest * cell_m), *_table()
-    loops = np.empty((_cut(*asked, _NO_LOOPS), _LONGEST_LOOP), np.int32)
-    _cut(*asked, loops)
+    vertices, loops = _through_cells(key, value, low, cell_m, np.float32(steepest * cell_m))
     if normals is None:
         faces = fans(loops)
     else:
         vertices, faces = with_features(vertices, loops, normals(vertices), cell_m)
     used, faces = _used(faces, len(vertices))
     return Mesh(origin, vertices[used], faces)
+
+
+def _through_cells(
+    key: Keys, value: Float32, low: Float32, cell_m: float, most_m: np.float32
+) -> tuple[Float32, Int32]:
+    """Vertices on the edges of cells, and (l, 7) their numbers around each loop through a cell."""
+    after = _next(key)
+    vertex_of, vertices = _vertices(key, value, after, low, cell_m)
+    asked = value, after, vertex_of, most_m, *_table()
+    loops = np.empty((_cut(*asked, _NO_LOOPS), _LONGEST_LOOP), np.int32)
+    _cut(*asked, loops)
+    return vertices, loops
 
 
 @compiled
