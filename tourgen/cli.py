@@ -187,11 +187,15 @@ def _build(asked: argparse.Namespace) -> int:
 def _built(asked: argparse.Namespace, out: str) -> Any:
     """Build, and report."""
     limit_native_threads()  # before anything loads such libraries
-    from tourgen.build import build_tour
-    from tourgen.progress import ProgressBars
     from tourgen.tour import check_tour
+    from tourgen.workers import load_ahead
 
     tour, _ = check_tour(asked.folder)
+    if asked.jobs != 1 and not asked.cluster:
+        load_ahead()
+    from tourgen.build import build_tour
+    from tourgen.progress import ProgressBars
+
     with ProgressBars() as bars:
         return build_tour(
             tour,

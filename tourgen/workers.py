@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_all_start_methods, get_context, parent_process
 from threading import Thread
 from typing import Any, Protocol
 
@@ -15,6 +15,9 @@ from tourgen.errors import InputError, MissingTool
 from tourgen.threads import cores, limit_native_threads
 
 _ANSWER_S = 10
+# Libraries that start threads do not survive a fork, but for one before they have started any.
+_START = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
+_STAGES = "tourgen.pipeline"
 
 
 class Workers(Protocol):
@@ -66,7 +69,7 @@ class Processes:
         self._pool = self._started()
 
     def _started(self) -> ProcessPoolExecutor:
-        context = get_context("spawn")  # libraries that start threads do not survive a fork
+        context = get_context(_START)
         return ProcessPoolExecutor(self.most, context, _die_with_parent)
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
@@ -134,6 +137,19 @@ class Cluster:
     def stop(self) -> None:
         """Leave the cluster, which goes on."""
         self._client.close()
+
+
+def load_ahead() -> None:
+    """Let another process load what workers need, while this one reads on: they are its forks.
+
+    It takes each worker, and this process, two seconds; forked, they share the memory, too.
+    """
+    limit_native_threads()
+    if _START == "forkserver":
+        from multiprocessing import forkserver
+
+        forkserver.set_forkserver_preload([_STAGES])
+        forkserver.ensure_running()
 
 
 @contextmanager
