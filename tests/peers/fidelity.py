@@ -6,7 +6,8 @@ held against the truth, as surfaces (``surface_score``, ``planes``, ``gaps``) an
 (``picture_score``, ``seams``, ``plaque``); what goes before, as cleaning, is judged too.
 ``--write`` puts tables and pictures into the docs after every room, and what was found beside
 them, so that a run of hours may be cut: rooms that are not asked for are written as they were
-last judged. What was made or measured before is kept in ``--scratch`` and not done again.
+last judged. With ``--keep-peers`` so are the peers, which do not change as our code does. What was
+made or measured before is kept in ``--scratch`` and not done again.
 """
 
 from __future__ import annotations
@@ -70,10 +71,13 @@ def _asked() -> argparse.Namespace:
     parser.add_argument("--scratch", type=Path, default=Path("build/fidelity"))
     parser.add_argument("--room", action="append", help="only this room")
     parser.add_argument("--method", action="append", help="only this method beside the published")
+    parser.add_argument("--keep-peers", action="store_true", help="as they were judged last")
     parser.add_argument("--skip-peers", action="store_true")
     parser.add_argument("--skip-picture", action="store_true")
     parser.add_argument("--write", type=Path, help="write the section of this Markdown file")
     given = parser.parse_args()
+    if given.keep_peers and not given.write:
+        parser.error("--keep-peers needs --write: earlier results lie beside that file")
     if given.write and _is_partial(given):
         print("writes no docs: not all contestants are judged", flush=True)
         given.write = None
@@ -89,6 +93,12 @@ def _is_partial(given: argparse.Namespace) -> bool:
 def _kept(docs: Path, room: str) -> Path:
     """Where a room's result is kept for runs that leave it out."""
     return docs.parent / "fidelity" / f"{room}.json"
+
+
+def _before(room: str, given: argparse.Namespace) -> RoomResult:
+    """What is not judged again: nothing, unless that was asked for."""
+    file = _kept(given.write, room) if given.keep_peers else None
+    return saved(file) if file and file.exists() else RoomResult(room)
 
 
 def _write(every: list[str], given: argparse.Namespace) -> None:
@@ -115,7 +125,9 @@ def _judged(room: BenchRoom, given: argparse.Namespace) -> RoomResult:
         one = contestants.published(PUBLISHED, given.tour / "site", room.id)
         columns[PUBLISHED] = one, bench.surface(one)
     columns |= _drawn(tour, bench, given.method or contestants.methods(), refused)
-    found, failed = ([], {}) if given.skip_peers else contestants.peers(room, given.scratch)
+    before = _before(room.id, given)
+    left_out = given.skip_peers or given.keep_peers
+    found, failed = ([], {}) if left_out else contestants.peers(room, given.scratch)
     rows = [(one, bench.surface(one)) for one in found]
     for program in dict.fromkeys(one.name for one, _ in rows):
         columns[program] = best([row for row in rows if row[0].name == program])
@@ -128,9 +140,13 @@ def _judged(room: BenchRoom, given: argparse.Namespace) -> RoomResult:
             sheets += _pictured(tour, bench, columns, refused, given)
     return RoomResult(
         room=room.id,
-        columns={name: figures for name, (_, figures) in columns.items()},
-        settings={name: one.setting for name, (one, _) in columns.items() if one.setting},
+        columns={name: figures for name, (_, figures) in columns.items()} | before.peers,
+        settings={
+            **before.settings,
+            **{name: one.setting for name, (one, _) in columns.items() if one.setting},
+        },
         tries=[
+            *before.tries,
             *(Try(one.name, one.setting, each["f_score_5mm"]) for one, each in rows),
             *(Try(program, setting, None, why) for (program, setting), why in failed.items()),
         ],
