@@ -16,6 +16,7 @@ help:
 	@echo "make bench       accuracy of the demo against its ground truth"
 	@echo "make bench-fidelity   every method and its peers against it (BENCH='--room chamber1')"
 	@echo "make bench-speed      time and memory beside what one does by hand (BENCH='--points 1300000')"
+	@echo "make bench-rooms      how many rooms use two cores"
 	@echo "make soak        a build killed at 30 moments, which takes half an hour"
 	@echo "make pictures    screenshots of the demo for README and docs"
 	@echo "make lock        pin the newest versions, with their hashes"
@@ -121,6 +122,11 @@ bench-fidelity: demo system-bench $(VENV)/.bench
 .PHONY: bench-speed
 bench-speed: demo system-bench $(VENV)/.bench
 	$(BIN)/python tests/peers/speed.py --demo $(DEMO) --write docs/benchmarks.md $(BENCH)
+
+# Alone on the machine, too.
+.PHONY: bench-rooms
+bench-rooms: demo
+	$(BIN)/python tests/peers/many_rooms.py --demo $(DEMO) --write docs/benchmarks.md $(BENCH)
 
 # ---- What is kept up
 

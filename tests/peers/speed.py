@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from score import Truth, load
 from sections import rewrite
+from speed_plot import plot
 from surface_score import Reference, Samples, surface_figures
 from usage import Usage, measured
 
@@ -32,12 +33,18 @@ from tourgen.stages.spacing import spacing
 from tourgen.stages.surface.poisson import SCALE
 
 ROOM = "chamber1"
-POINTS = (130_000, 1_300_000, 15_200_000)
+POINTS = (130_000, 1_300_000, 15_200_000, 150_000_000)
 MOST_S, MOST_MB = 3600.0, 20_000.0
+OURS = "tourgen"
+BUILDS = {OURS: "", f"{OURS}, poisson": "poisson"}
+"""Ours by the surface's method; "" for the default."""
 CHAINS = ("meshlab", "open3d")
 HEADING = "Time and memory"
 STAGES = """Where tourgen's time goes: seconds from each stage's start to its end; some run beside
-others.
+others. With `surface.method = "poisson"` the solve is all of `surface`.
+"""
+PLOT = "pictures/speed.svg"
+SHOWN = """The same against points, both axes logarithmic, each chain at its deeper depth:
 """
 _LEAST_S = 1.0
 AROUND_M = 0.1
@@ -79,20 +86,25 @@ def _write(kept: Path, docs: Path) -> None:
     files = sorted(kept.glob("*.json"), key=lambda file: int(file.stem))
     found = {int(file.stem): json.loads(file.read_text("utf-8")) for file in files}
     rows = [row for each in found.values() for row in each["rows"]]
-    stages = {points: each["stages"] for points, each in found.items()}
-    rewrite(docs, HEADING, f"{PREAMBLE}\n{markdown(rows)}\n\n{STAGES}\n{stage_table(stages)}")
+    stages = {
+        f"{points:,}{program.removeprefix(OURS)}": seconds
+        for points, each in found.items()
+        for program, seconds in each["stages"].items()
+    }
+    plot(rows, docs.parent / PLOT)
+    shown = f"{SHOWN}\n![time and memory against points]({PLOT})"
+    text = [PREAMBLE, f"{markdown(rows)}\n", f"{shown}\n", STAGES, stage_table(stages)]
+    rewrite(docs, HEADING, "\n".join(text))
 
 
 def compared(
     points: int, given: argparse.Namespace
-) -> tuple[list[dict[str, Any]], dict[str, float]]:
-    """A row for tourgen and for each chain; the seconds of tourgen's stages."""
+) -> tuple[list[dict[str, Any]], dict[str, dict[str, float]]]:
+    """A row for each build by tourgen and for each chain; the seconds of our builds' stages."""
     tour = given.scratch.resolve() / f"{points}"
     _scanned(points, tour, given.demo)
     truth = Truth(tour / "truth", ROOM)
     reference = Reference.of(truth)
-    shutil.rmtree(tour / ".tourgen", ignore_errors=True)
-    shutil.rmtree(tour / "site", ignore_errors=True)
 
     def row(name: str, usage: Usage, mesh: Path) -> dict[str, Any]:
         print(f"{points}: {name}: {usage.wall_s:.0f} s, {usage.peak_mb:.0f} MB", flush=True)
@@ -106,9 +118,15 @@ def compared(
         log = tour / f"{name}.log"
         return measured([sys.executable, *command], most_s=MOST_S, most_mb=MOST_MB, log=log)
 
-    site = tour / "site/rooms" / ROOM
-    rows = [row("tourgen", run("tourgen", "-m", "tourgen.cli", "build", str(tour)), site)]
-    report = json.loads((tour / "site/report.json").read_text("utf-8"))["rooms"][ROOM]
+    rows, stages, faces = [], {}, 0
+    for name, method in BUILDS.items():
+        folder = _afresh(tour, method)
+        usage = run(name, "-m", "tourgen.cli", "build", str(folder))
+        rows.append(row(name, usage, folder / "site/rooms" / ROOM))
+        if not usage.failed:
+            told = json.loads((folder / "site/report.json").read_text("utf-8"))["rooms"][ROOM]
+            stages[name] = told["seconds"]
+            faces = faces or told["faces"][-1]
     eye = truth.stations[0]
     low, high = truth.vertices.min(axis=0) - AROUND_M, truth.vertices.max(axis=0) + AROUND_M
     asked = itertools.product(given.chain or CHAINS, _depths(tour, low, high))
@@ -120,9 +138,24 @@ def compared(
         command = [str(Path(__file__).with_name("by_hand.py")), chain]
         command += [str(tour / "scans" / f"{ROOM}.ply"), str(out), "--box", *told]
         command += ["--eye", *map(str, eye), "--depth", str(depth)]
-        command += ["--faces", str(report["faces"][-1])]
+        command += ["--faces", str(faces)]
         rows.append(row(name, run(out.name, *command), out / "mesh.ply"))
-    return rows, report["seconds"]
+    return rows, stages
+
+
+def _afresh(tour: Path, method: str) -> Path:
+    """A tour's folder without what was built, the surface by a method; itself where none."""
+    folder = tour / method
+    folder.mkdir(exist_ok=True)
+    shutil.rmtree(folder / ".tourgen", ignore_errors=True)
+    shutil.rmtree(folder / "site", ignore_errors=True)
+    if method:
+        told = (tour / "tour.toml").read_text("utf-8")
+        surface = f'[room.surface]\nmethod = "{method}"\n'
+        (folder / "tour.toml").write_text(f"{told}\n{surface}", encoding="utf-8")
+        if not (folder / "scans").exists():
+            (folder / "scans").symlink_to(tour / "scans")
+    return folder
 
 
 def _scanned(points: int, tour: Path, demo: Path) -> None:
@@ -160,7 +193,7 @@ def markdown(rows: list[dict[str, Any]]) -> str:
         "| points | program | s | times | processor s | peak MB | faces | F 5 mm | p95 mm |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    ours = {each["points"]: each["wall_s"] for each in rows if each["program"] == "tourgen"}
+    ours = {each["points"]: each["wall_s"] for each in rows if each["program"] == OURS}
     for each in rows:
         start = f"| {each['points']:,} | {each['program']} "
         if each["failed"]:
@@ -175,8 +208,8 @@ def markdown(rows: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def stage_table(stages: dict[int, dict[str, float]]) -> str:
-    """Seconds of each stage that takes one at least, by the number of points."""
+def stage_table(stages: dict[str, dict[str, float]]) -> str:
+    """Seconds of each stage that takes one at least, by the number of points and the method."""
     names = [
         name
         for name in next(iter(stages.values()))
@@ -184,7 +217,7 @@ def stage_table(stages: dict[int, dict[str, float]]) -> str:
     ]
     return "\n".join(
         [
-            "| stage | " + " | ".join(f"{points:,}" for points in stages) + " |",
+            "| stage | " + " | ".join(stages) + " |",
             "|---|" + "---|" * len(stages),
             *(
                 f"| {name} | "
