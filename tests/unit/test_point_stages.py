@@ -115,7 +115,11 @@ def test_spacing_is_that_of_the_grid() -> None:
 # ------------------------------------------------------------------ stations
 
 
-def test_stations_are_found_by_their_blind_discs() -> None:
+@pytest.mark.parametrize("most", [250_000, 80_000], ids=["every point", "one in three"])
+def test_stations_are_found_by_their_blind_discs(
+    most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stations, "_MOST_POINTS", most)
     eyes = np.array([[-1.0, -1.2, 1.5], [0.9, 1.1, 1.45]])
     found = stations.find_stations(np.float32(scanned_box(eyes, 250_000)), stations.Settings())
     assert len(found) == 2
