@@ -142,9 +142,9 @@ class Cluster:
 def load_ahead() -> None:
     """Let another process load what workers need, while this one reads on: they are its forks.
 
-    It takes each worker, and this process, two seconds; forked, they share the memory, too.
+    It takes each worker, and this process, two seconds; forked, they share the memory, too. To be
+    called after ``limit_native_threads``: the fork server may start no threads.
     """
-    limit_native_threads()
     if _START == "forkserver":
         from multiprocessing import forkserver
 

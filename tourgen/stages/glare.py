@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from tourgen.geometry import Float32, Float64, PointCloud, UInt8
+from tourgen.geometry import Float32, Float64, Int32, PointCloud, UInt8
 from tourgen.neighbours import Neighbours
 from tourgen.stages.burnt import burnt_out
 from tourgen.stages.cells import Cells, cells_of
@@ -95,13 +95,13 @@ class _About:
         off_deg: (n,) angle to its middle, whole degrees.
     """
 
-    spot: Int16
+    spot: Int32
     off_deg: Int16
 
 
 def _about_burnt(cloud: PointCloud, burnt: Bool, stations: Float64, settings: Settings) -> _About:
     """About which spots the points of all stations lie."""
-    about = _About(np.full(len(cloud), -1, np.int16), np.zeros(len(cloud), np.int16))
+    about = _About(np.full(len(cloud), -1, np.int32), np.zeros(len(cloud), np.int16))
     spots = 0
     for number, station in enumerate(stations):
         own = np.flatnonzero(cloud.station == number)
@@ -128,7 +128,7 @@ def _about_spots(way: Float32, burnt: Bool, settings: Settings) -> _About:
     count, spot = connected_components(touching, directed=False)
     summed = np.stack([np.bincount(spot, axis, count) for axis in seeds.data.T], axis=1)
     middles = summed / np.linalg.norm(summed, axis=1, keepdims=True)
-    spot_of = np.append(spot, -1)[nearest][of_cell].astype(np.int16)
+    spot_of = np.append(spot, -1)[nearest][of_cell].astype(np.int32)
     cosine = (way * middles[spot_of].astype(np.float32)).sum(axis=1)
     return _About(spot_of, np.degrees(np.arccos(np.clip(cosine, -1, 1))).astype(np.int16))
 

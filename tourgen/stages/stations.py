@@ -62,7 +62,7 @@ def find_stations(points: Float32, settings: Settings) -> Float64:
     Returns:
         (s, 3) metres, strongest evidence first; s is 0 where no disc stands out.
     """
-    points = points[:: max(1, len(points) // _MOST_POINTS)]
+    points = points[:: max(1, -(-len(points) // _MOST_POINTS))]
     discs = [disc for level_z in _levels_z(points) for disc in _discs(points, level_z, settings)]
     found: list[Float64] = []
     for disc in sorted(discs, key=lambda disc: -disc.contrast):
