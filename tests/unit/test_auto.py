@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from sampled import box_corner, cloud, faces_per_edge, runs_one_way, sphere
+from scanned import EYES, ROOM, beams, cloud_of, inside, ranges, solid
 
 from tourgen.geometry import OrientedCloud
 from tourgen.stages.surface import auto, poisson, signed_distance
@@ -55,3 +57,40 @@ def test_points_too_far_apart_are_left_to_the_solve() -> None:
     found = auto.auto(sphere(2_000), replace(SETTINGS, distance=sparse))
     assert found.dense_share == 0
     assert np.abs(np.linalg.norm(found.mesh.vertices, axis=1) - 1).max() < 0.02
+
+
+def test_a_boards_rim_ends_where_beams_went_on_past_it() -> None:
+    low, high = np.array([-0.6, 1.6, 1.175]), np.array([0.6, 2.0, 1.2])
+    parts, normals = [], []
+    for eye in EYES:
+        way = beams(0.4).reshape(-1, 3)
+        reach = ranges(eye, way, inside(*ROOM), solid(low, high))
+        points = eye + way * reach[:, None]
+        parts.append(points)
+        normals.append(inward(points, low, high))
+    given = OrientedCloud(cloud_of(parts), np.concatenate(normals), EYES)
+    found = auto.auto(given, SETTINGS).mesh.vertices
+    beside = ((found > low - 0.06) & (found < high + 0.06)).all(axis=1)
+    outside_m = np.linalg.norm(np.maximum(np.maximum(low - found, found - high), 0), axis=1)
+    wall_m = (ROOM[1] - found).min(axis=1)
+    watched = found[beside & (outside_m > 0.008) & (wall_m > 0.008)]
+    assert not len(watched) or not np.any([went_on_past(watched, eye, low, high) for eye in EYES])
+
+
+def went_on_past(places: np.ndarray, eye: np.ndarray, low: np.ndarray, high: np.ndarray) -> Any:
+    """Which places an eye saw through, a beam's breadth around."""
+    way = places - eye
+    away = np.linalg.norm(way, axis=1)
+    wide = np.radians(0.4) * away.max()
+    reach = ranges(eye, way / away[:, None], inside(*ROOM), solid(low - wide, high + wide))
+    return reach > away + 0.01
+
+
+def inward(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Normals of a room's walls and of a box in it, into the free space."""
+    gaps = np.concatenate([points - ROOM[0], ROOM[1] - points], axis=1)
+    box = np.concatenate([low - points, points - high], axis=1)
+    on_box = box.max(axis=1) < 1e-4
+    side = np.where(on_box, np.abs(box).argmin(axis=1), np.abs(gaps).argmin(axis=1))
+    sign = np.where((side < 3) == on_box, -1.0, 1.0)
+    return np.eye(3)[side % 3] * sign[:, None]

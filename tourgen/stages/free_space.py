@@ -13,16 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from tourgen.compiled import compiled
 from tourgen.geometry import Float32, Float64, PointCloud
+from tourgen.neighbours import Grid, nearest_to
 from tourgen.stages.sift.views import View, views
+from tourgen.threads import in_parts
 
 _BEAMS = 6
+_AROUND = 8
+"""Beams among which those to both sides of a rim are looked for."""
+_SPARE_STEPS = 0.25
+"""How far a rim is thought to go on past the middle between beams, in their steps."""
+_PART = 1 << 14
 _VOID_STEPS = 2.5
 _SAMPLE = 20_000
 _ENOUGH = 3_000_000
 """Beams that tell what is empty to a centimetre in a room; more of them would only cost."""
 
 Mask = npt.NDArray[np.bool_]
+_Asked = tuple[Grid, Float32, Float32, np.float32, np.float32, np.float32, np.float32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +40,14 @@ class FreeSpace:
 
     Attributes:
         views: The points of each station.
-        void_rad: Of each station, radians: where no beam lies nearer in direction, none returned.
+        step_rad: Angle between neighbouring beams of each station.
+        void_rad: Of each station: where no beam lies nearer in direction, none returned.
         lowest_deg: Lower edge of the scanners' field of view.
         margin_m: How far in front of what was measured a place is known to be empty.
     """
 
     views: tuple[View, ...]
+    step_rad: tuple[float, ...]
     void_rad: tuple[float, ...]
     lowest_deg: float
     margin_m: float
@@ -57,25 +68,57 @@ class FreeSpace:
             out |= np.isinf(reach_m) & seen
         return out
 
+    def depth_m(self, places: Float32, normals: Float32) -> Float32:
+        """How deep places lie in what beams went through.
+
+        A rim runs half way between the beams that it stopped and those that went on past it. A
+        beam that ended on the very sheet which a place belongs to went past nothing: at a grazing
+        angle it only met it farther on.
+
+        Args:
+            places: (n, 3)
+            normals: (n, 3) unit normals of the sheets that the places may belong to.
+
+        Returns:
+            (n,) metres from the rim, negative behind it, minus infinity where nothing is known.
+        """
+        depth_m = np.full(len(places), -np.inf, np.float32)
+        for view, step_rad, void_rad in zip(self.views, self.step_rad, self.void_rad, strict=True):
+            asked = (
+                view.beams.grid,
+                view.beam_m,
+                view.station.astype(np.float32),
+                np.float32(void_rad),
+                np.float32(np.sin(np.radians(self.lowest_deg))),
+                np.float32(self.margin_m),
+                np.float32(_SPARE_STEPS * step_rad),
+            )
+
+            def tell(first: int, last: int, asked: _Asked = asked) -> None:
+                _deepen(*asked, places[first:last], normals[first:last], depth_m[first:last])
+
+            in_parts(tell, len(places), _PART)
+        return depth_m
+
     def _beams(self, number: int, points: Float32) -> tuple[Float32, Float32, Mask]:
         """Range of each place, least range of the beams around it, and whether there may be any."""
         view = self.views[number]
         way = points - view.station.astype(np.float32)
         distance = np.maximum(np.linalg.norm(way, axis=1), np.float32(1e-6))
         way /= distance[:, None]
-        _, index = view.tree.query(
-            way,
-            k=np.arange(1, _BEAMS + 1),
-            distance_upper_bound=self.void_rad[number],
-            workers=-1,
-        )
+        index, _ = view.beams.nearest(way, _BEAMS, self.void_rad[number])
         range_m = np.append(view.range_m, np.float32(np.inf))
         seen = way[:, 2] > np.sin(np.radians(self.lowest_deg))
         return distance, range_m[index].min(axis=1), np.asarray(seen)
 
 
 def free_space(
-    cloud: PointCloud, stations: Float64, void_deg: float, lowest_deg: float, margin_m: float
+    cloud: PointCloud,
+    stations: Float64,
+    void_deg: float,
+    lowest_deg: float,
+    margin_m: float,
+    most_beams: int = _ENOUGH,
 ) -> FreeSpace:
     """What (s, 3) stations that measured a cloud know to be empty.
 
@@ -87,16 +130,58 @@ def free_space(
             farther apart than 0.4 of it.
         lowest_deg: Lower edge of the scanners' field of view.
         margin_m: How far in front of what was measured a place is known to be empty.
+        most_beams: So many are taken at most.
     """
-    if len(cloud) > _ENOUGH:
-        cloud = cloud.take(np.random.default_rng(0).permutation(len(cloud))[:_ENOUGH])
+    if len(cloud) > most_beams:
+        cloud = cloud.take(np.random.default_rng(0).permutation(len(cloud))[:most_beams])
     seen = tuple(views(cloud, stations))
-    void_rad = tuple(max(float(np.radians(void_deg)), _VOID_STEPS * _step_rad(v)) for v in seen)
-    return FreeSpace(seen, void_rad, lowest_deg, margin_m)
+    step_rad = tuple(_step_rad(view) for view in seen)
+    void_rad = tuple(max(float(np.radians(void_deg)), _VOID_STEPS * step) for step in step_rad)
+    return FreeSpace(seen, step_rad, void_rad, lowest_deg, margin_m)
 
 
 def _step_rad(view: View) -> float:
     """Angle between neighbouring beams, radians."""
     sample = view.direction[:: max(1, len(view) // _SAMPLE)]
-    distance, _ = view.tree.query(sample, k=[min(5, len(view))], workers=-1)
-    return float(np.median(distance) * np.sqrt(np.pi / 4))
+    _, distance = view.beams.nearest(sample, min(5, len(view)))
+    return float(np.median(distance[:, -1]) * np.sqrt(np.pi / 4))
+
+
+@compiled
+def _deepen(
+    beams: Grid,
+    range_m: Float32,
+    station: Float32,
+    void_rad: np.float32,
+    lowest: np.float32,
+    margin_m: np.float32,
+    spare_rad: np.float32,
+    places: Float32,
+    normals: Float32,
+    depth_m: Float32,
+) -> None:
+    """Raise the depths of some places to what one station tells; see ``FreeSpace.depth_m``."""
+    directions = beams[0]
+    index, square = np.empty(_AROUND, np.int32), np.empty(_AROUND, np.float32)
+    way, normal = np.empty(3, np.float32), np.empty(3, np.float32)
+    for i in range(len(places)):
+        way[:], normal[:] = places[i] - station, normals[i]
+        distance = max(np.sqrt((way * way).sum()), np.float32(1e-6))
+        height = (way * normal).sum()
+        way /= distance
+        if way[2] <= lowest:
+            continue
+        most = void_rad**2
+        found = nearest_to(beams, way[0], way[1], way[2], most, most, index, square)
+        if found < _BEAMS:
+            continue
+        stopped, went_on = square[found - 1], np.float32(np.inf)
+        for k in range(found - 1, -1, -1):
+            reach = range_m[index[k]]
+            above = reach * (directions[index[k]] * normal).sum() - height
+            if reach > distance + margin_m and above < -margin_m:
+                went_on = square[k]
+            else:
+                stopped = square[k]
+        middle = (np.sqrt(stopped) - np.sqrt(went_on)) / 2
+        depth_m[i] = max(depth_m[i], (middle - spare_rad) * distance)

@@ -39,7 +39,7 @@ from tourgen.stages.mesh_arrays import (
 )
 from tourgen.stages.specks import without_specks
 
-VERSION = 10
+VERSION = 11
 _ALIKE = 0.5
 """Cosine between a pane and its rest, at least."""
 _AROUND = 2.0

@@ -12,11 +12,14 @@ from scipy.ndimage import binary_dilation
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64, PointCloud
+from tourgen.neighbours import Neighbours
 from tourgen.stages.sift.picture import Picture, noise_by_range, picture
 from tourgen.stages.sight import depth_buffer
 
 _SIGHT_CELL_DEG = 0.5
 _BLOCK = 100_000
+_BEAMS = 8
+"""Looked for at once, mostly."""
 _SMOOTH = 2.0
 _ON_PLANE = 2.5
 _LEAST_BEAMS = 5
@@ -47,9 +50,14 @@ class View:
         return len(self.index)
 
     @cached_property
-    def tree(self) -> cKDTree:
-        """Over the directions of all points."""
-        return cKDTree(self.direction)
+    def beams(self) -> Neighbours:
+        """The directions of all points."""
+        return Neighbours.of(self.direction, _BEAMS)
+
+    @cached_property
+    def beam_m(self) -> Float32:
+        """(m,) range of each of ``beams``, as they are sorted."""
+        return self.range_m[self.beams.number]
 
     @cached_property
     def picture(self) -> Picture:

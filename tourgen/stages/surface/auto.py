@@ -27,12 +27,18 @@ import numpy.typing as npt
 from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud, PointCloud
 from tourgen.neighbours import Neighbours
 from tourgen.rays import ray_scene
+from tourgen.stages.free_space import FreeSpace, free_space
 from tourgen.stages.mesh_arrays import face_areas, vertex_normals
 from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.voxels import voxel_groups
 
-VERSION = 9
+VERSION = 10
+_VOID_DEG = 0.75
+_LOWEST_DEG = -58.0
+_MOST_BEAMS = 10_000_000
+_SIGMAS = 4.0
+"""Of the noise, by which a beam must have gone on past a place."""
 Mask = npt.NDArray[np.bool_]
 
 
@@ -83,7 +89,8 @@ def auto(oriented: OrientedCloud, settings: Settings) -> Chosen:
     """
     shapes = signed_distance.shapes(oriented, settings.distance)
     planes = shapes.planes
-    known = signed_distance.distances(planes, settings.distance)
+    free = _free(oriented, planes.noise_m)
+    known = signed_distance.distances(planes, settings.distance, free)
     solved = _solved(known, oriented.cloud.origin, settings)
     if solved is None:
         return Chosen(poisson.poisson(oriented, settings.alone), 0.0)
@@ -94,6 +101,13 @@ def auto(oriented: OrientedCloud, settings: Settings) -> Chosen:
     mesh = known.carried_on(_Closed(solved, ~near)).zero_set(oriented.cloud.origin)
     share = _share(mesh, _near(mesh, planes, reach_m))
     return Chosen(shapes.with_rods(mesh, settings.distance), share)
+
+
+def _free(oriented: OrientedCloud, noise_m: float) -> FreeSpace | None:
+    """What the stations saw through; None where none is known."""
+    if not len(oriented.stations):
+        return None
+    return free_space(oriented.cloud, oriented.stations, _VOID_DEG, _LOWEST_DEG, _SIGMAS * noise_m)
 
 
 def _solved(known: signed_distance.Distances, origin: Float64, settings: Settings) -> Mesh | None:

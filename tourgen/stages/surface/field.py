@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from tourgen.compiled import compiled
 from tourgen.extent import extent
 from tourgen.geometry import Float32, Int32
 from tourgen.neighbours import Grid, Neighbours, nearest_to
+from tourgen.stages.free_space import FreeSpace
 from tourgen.stages.surface.growing import distinct
 from tourgen.stages.surface.marching_cubes import Keys, corner_of, key_of
 from tourgen.stages.surface.tangent_planes import TangentPlanes
@@ -20,6 +23,10 @@ _DENSEST, _SPARSEST = 0.5, 2.0
 """The part of the room's spacing that a region's own counts for, at least and at most."""
 _FADE = 0.3
 """Last part of a plane's reach over which another surface may take over."""
+_BARE = 0.4
+"""From this part of a plane's reach on beams may contradict it: its rim is not known better."""
+_DEEPEST = np.float32(3)
+"""Cells in front of a rim up to which a distance is told there."""
 _MARGIN = 0.2
 """How far the grid goes on around the points, in their extent: a surface that closes gaps may."""
 
@@ -41,11 +48,14 @@ class Field:
         reach: float,
         crease_deg: float,
         blend: int,
+        free: FreeSpace | None,
     ) -> None:
         own_m = np.clip(planes.spacing_m, _DENSEST * spacing_m, _SPARSEST * spacing_m)
         reach_m = np.float32(reach) * own_m + np.float32(planes.noise_m)
         self._alike = np.float32(np.cos(np.radians(2 * crease_deg)))
         self._count = min(blend + 1, len(planes.points))
+        self._free, self._planes = free, planes
+        self._nearest = Neighbours.of(planes.points, 1)
         around = Neighbours.of(planes.points, self._count)
         order = around.number
         self._grid, self._normals, self._reach_m = (
@@ -69,14 +79,30 @@ class Field:
 
     def distance(self, key: Keys) -> Float32:
         """(n,) distances at (n,) corners, NaN where unknown."""
-        distance, far = self._told(key)
+        places = self.places(key)
+        distance, far, _ = self._at(places, False)
         distance[~(far < 1)] = np.nan
-        return distance
+        return self._carved(places, distance, far)
 
-    def faded(self, key: Keys) -> tuple[Float32, Float32]:
-        """(n,) distances at (n,) corners, and how much they are worth, 1 to 0 where unknown."""
-        distance, far = self._told(key)
-        return distance, np.clip((1 - far) / np.float32(_FADE), 0, 1)
+    def carried_on(self, key: Keys, beyond: Beyond) -> Float32:
+        """The same, fading into the distance to another surface where it becomes unknown."""
+        places = self.places(key)
+        distance, far, _ = self._at(places, False)
+        trust = np.clip((1 - far) / np.float32(_FADE), 0, 1)
+        rest = trust < 1
+        theirs = beyond.distance(places[rest])
+        distance[rest] = trust[rest] * distance[rest] + (1 - trust[rest]) * theirs
+        return self._carved(places, distance, far)
+
+    def _carved(self, places: Float32, distance: Float32, far: Float32) -> Float32:
+        """(n,) distances, positive too where beams went on through what the planes only claim."""
+        if self._free is None:
+            return distance
+        at = np.flatnonzero((far > _BARE) & (distance <= 0))
+        nearest, _ = self._nearest.nearest(places[at], 1)
+        depth = self._free.depth_m(places[at], self._planes.normals[nearest[:, 0]])
+        distance[at] = np.maximum(distance[at], np.minimum(depth, _DEEPEST * self.cell_m))
+        return distance
 
     def normal(self, places: Float32) -> Float32:
         """(n, 3) unit normals at (n, 3) places on the surface, NaN where unknown.
@@ -85,10 +111,6 @@ class Field:
         """
         _, _, normal = self._at(places, True)
         return normal
-
-    def _told(self, key: Keys) -> tuple[Float32, Float32]:
-        distance, far, _ = self._at(self.places(key), False)
-        return distance, far
 
     def _at(self, places: Float32, looks: bool) -> tuple[Float32, Float32, Float32]:
         """(n,) distances, (n,) how far off the nearest plane's point, in its reach; normals."""
@@ -207,3 +229,17 @@ def _over_round(
         offset = mx * (x - points[j, 0]) + my * (y - points[j, 1]) + mz * (z - points[j, 2])
         over += weight[k] * (height[k] + offset)
     return over / (2 * max(total, np.float32(1e-9)))
+
+
+class Beyond(Protocol):
+    """A surface that goes on where the points end.
+
+    Attributes:
+        seeds: (m, 3) float32, places on it, metres.
+    """
+
+    seeds: Float32
+
+    def distance(self, places: Float32) -> Float32:
+        """(n,) metres that each of (n, 3) places lies in front of it."""
+        ...

@@ -40,7 +40,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -48,8 +47,9 @@ import numpy.typing as npt
 from tourgen.errors import StageError
 from tourgen.extent import extent
 from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud
+from tourgen.stages.free_space import FreeSpace
 from tourgen.stages.sift.strays import clusters
-from tourgen.stages.surface.field import Field
+from tourgen.stages.surface.field import Beyond, Field
 from tourgen.stages.surface.flats import flattened
 from tourgen.stages.surface.growing import grown
 from tourgen.stages.surface.marching_cubes import (
@@ -249,11 +249,7 @@ class Distances:
         field = self.field
 
         def told(key: Keys) -> Float32:
-            distance, trust = field.faded(key)
-            rest = trust < 1
-            theirs = beyond.distance(field.places(key[rest]))
-            distance[rest] = trust[rest] * distance[rest] + (1 - trust[rest]) * theirs
-            return distance
+            return field.carried_on(key, beyond)
 
         rim = np.flatnonzero(beside(self.key, np.isnan(self.value)))
         value = self.value.copy()
@@ -262,8 +258,10 @@ class Distances:
         return _grown(field, told, seeds, self.key, value, _STEEPEST_ACROSS)
 
 
-def distances(planes: TangentPlanes, settings: Settings) -> Distances:
-    """The distance to tangent planes, from the cells with points on."""
+def distances(
+    planes: TangentPlanes, settings: Settings, free: FreeSpace | None = None
+) -> Distances:
+    """The distance to tangent planes, from the cells with points on, what is free cut out."""
     field = Field(
         planes,
         settings.cell_m,
@@ -271,6 +269,7 @@ def distances(planes: TangentPlanes, settings: Settings) -> Distances:
         settings.reach,
         settings.crease_deg,
         settings.blend,
+        free,
     )
     nothing = np.empty(0, np.int64), np.empty(0, np.float32)
     return _grown(field, field.distance, field.seeds, *nothing, _STEEPEST)
@@ -286,17 +285,3 @@ def _grown(
 ) -> Distances:
     most_m = float(np.sqrt(2) * steepest * field.cell_m)
     return Distances(field, *grown(told, seeds, key, value, most_m), steepest)
-
-
-class Beyond(Protocol):
-    """A surface that goes on where the points end.
-
-    Attributes:
-        seeds: (m, 3) float32, places on it, metres.
-    """
-
-    seeds: Float32
-
-    def distance(self, places: Float32) -> Float32:
-        """(n,) metres that each of (n, 3) places lies in front of it."""
-        ...
