@@ -37,7 +37,7 @@ __all__ = [
     "vistas",
 ]
 
-VERSION = 12
+VERSION = 13
 
 
 def bake(
