@@ -29,7 +29,7 @@ from tourgen.stages import glare
 from tourgen.stages.burnt import ends
 from tourgen.stages.cells import cells_of
 
-VERSION = 6
+VERSION = 7
 
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]

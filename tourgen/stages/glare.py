@@ -38,7 +38,9 @@ class Settings:
         reach_deg: How far it reaches about a burnt-out direction.
         cell_m: Edge of the cells in which stations are compared.
         cell_points: Fewest points of a station in a cell.
-        brighter: By how much such a cell is brighter than another station's, at the least.
+        brighter: By how much such a cell is brighter than another station's, at the least, and all
+            that lie as far off the lamp in the middle: white things burn out, and lay nothing over
+            what is about them.
         ring_cells: So many cells, at the least, tell the glare at one angle off a lamp.
         dazzled: How much brighter cells so far off the lamp have to be, in the middle, for those
             that no other station saw to take the colours about them.
@@ -174,13 +176,15 @@ def _glared(cloud: PointCloud, burnt: _About, lamps: Bool, settings: Settings) -
     cells = cells_of(cloud.points[about], cloud.station[about], count, settings.cell_m)
     seen = _Shades.of(cells, cloud.colors[about], settings)
     suspect = cells.means(near[about][:, None])[:, 0] > 0.5
-    glared[about] = cells.of_points(suspect & (seen.shade > seen.least + settings.brighter))
     first = cells.order[cells.starts]
     where = _About(burnt.spot[about][first], burnt.off_deg[about][first])
-    dark = suspect & ~lamps[about][first] & (where.spot >= 0)
+    suspect &= where.spot >= 0
+    dark = suspect & ~lamps[about][first]
     excess = _excess(seen, where, dark & seen.told & seen.enough, settings)
-    alone = dark & ~seen.told & (excess[where.spot, where.off_deg] > settings.dazzled)
-    dazzled[about] = cells.of_points(alone)
+    excess = np.where(suspect, excess[where.spot, where.off_deg], 0)
+    brighter = (seen.shade > seen.least + settings.brighter) & (excess > settings.brighter)
+    glared[about] = cells.of_points(suspect & brighter)
+    dazzled[about] = cells.of_points(dark & ~seen.told & (excess > settings.dazzled))
     return glared, dazzled
 
 
