@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sampled import box_corner, cloud, faces_per_edge, runs_one_way, sphere
+from sampled import borders, box_corner, cloud, faces_per_edge, runs_one_way, sphere
 from scanned import EYES, ROOM, beams, cloud_of, inside, ranges, solid
 
 from tourgen.geometry import OrientedCloud
@@ -59,7 +59,7 @@ def test_points_too_far_apart_are_left_to_the_solve() -> None:
     assert np.abs(np.linalg.norm(found.mesh.vertices, axis=1) - 1).max() < 0.02
 
 
-def test_a_boards_rim_ends_where_beams_went_on_past_it() -> None:
+def test_a_board_ends_where_beams_went_on_past_it() -> None:
     low, high = np.array([-0.6, 1.6, 1.175]), np.array([0.6, 2.0, 1.2])
     parts, normals = [], []
     for eye in EYES:
@@ -69,7 +69,10 @@ def test_a_boards_rim_ends_where_beams_went_on_past_it() -> None:
         parts.append(points)
         normals.append(inward(points, low, high))
     given = OrientedCloud(cloud_of(parts), np.concatenate(normals), EYES)
-    found = auto.auto(given, SETTINGS).mesh.vertices
+    mesh = auto.auto(given, SETTINGS).mesh
+    found = mesh.vertices
+    ends = found[borders(mesh)].reshape(-1, 3)
+    assert not ((ends > low - 0.3) & (ends < high + 0.3) & (ends < ROOM[1])).all(axis=1).any()
     beside = ((found > low - 0.06) & (found < high + 0.06)).all(axis=1)
     outside_m = np.linalg.norm(np.maximum(np.maximum(low - found, found - high), 0), axis=1)
     wall_m = (ROOM[1] - found).min(axis=1)

@@ -33,7 +33,7 @@ from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.voxels import voxel_groups
 
-VERSION = 10
+VERSION = 11
 _VOID_DEG = 0.75
 _LOWEST_DEG = -58.0
 _MOST_BEAMS = 10_000_000

@@ -26,7 +26,8 @@ _FADE = 0.3
 _BARE = 0.4
 """From this part of a plane's reach on beams may contradict it: its rim is not known better."""
 _DEEPEST = np.float32(3)
-"""Cells in front of a rim up to which a distance is told there."""
+"""Cells off the surface up to which a distance is told where another surface is cut back: told
+farther, it would jump from deep behind that to in front of the cut, and leave it open."""
 _MARGIN = 0.2
 """How far the grid goes on around the points, in their extent: a surface that closes gaps may."""
 
@@ -90,7 +91,7 @@ class Field:
         distance, far, _ = self._at(places, False)
         trust = np.clip((1 - far) / np.float32(_FADE), 0, 1)
         rest = trust < 1
-        theirs = beyond.distance(places[rest])
+        theirs = np.maximum(beyond.distance(places[rest]), -_DEEPEST * self.cell_m)
         distance[rest] = trust[rest] * distance[rest] + (1 - trust[rest]) * theirs
         return self._carved(places, distance, far)
 
