@@ -19,6 +19,8 @@ from tourgen.neighbours import Grid, nearest_to
 from tourgen.stages.sift.views import View, views
 from tourgen.threads import in_parts
 
+LOWEST_DEG = -58.0
+"""Lower edge of a scanner's field of view, as most have it."""
 _BEAMS = 6
 _AROUND = 8
 """Beams among which those to both sides of a rim are looked for."""

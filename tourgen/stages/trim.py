@@ -27,7 +27,7 @@ from tourgen.geometry import Float32, Mesh, OrientedCloud, PointCloud
 from tourgen.neighbours import Neighbours
 from tourgen.stages.bulges import mostly, without_bulges
 from tourgen.stages.covers import with_covers
-from tourgen.stages.free_space import free_space
+from tourgen.stages.free_space import LOWEST_DEG, free_space
 from tourgen.stages.mesh_arrays import (
     compact,
     components,
@@ -64,7 +64,7 @@ class Settings:
     """
 
     support_m: float
-    lowest_deg: float = -58.0
+    lowest_deg: float = LOWEST_DEG
     void_deg: float = 1.1
     margin_m: float = 0.08
     back_margin_m: float = 0.02

@@ -27,7 +27,7 @@ import numpy.typing as npt
 from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud, PointCloud
 from tourgen.neighbours import Neighbours
 from tourgen.rays import ray_scene
-from tourgen.stages.free_space import FreeSpace, free_space
+from tourgen.stages.free_space import LOWEST_DEG, FreeSpace, free_space
 from tourgen.stages.mesh_arrays import face_areas, vertex_normals
 from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.tangent_planes import TangentPlanes
@@ -35,8 +35,9 @@ from tourgen.voxels import voxel_groups
 
 VERSION = 11
 _VOID_DEG = 0.75
-_LOWEST_DEG = -58.0
+"""Where six beams do not lie nearer in direction, nothing is known of what they went through."""
 _MOST_BEAMS = 10_000_000
+"""Rims are told as finely as beams lie; more than these would only take memory."""
 _SIGMAS = 4.0
 """Of the noise, by which a beam must have gone on past a place."""
 Mask = npt.NDArray[np.bool_]
@@ -107,7 +108,7 @@ def _free(oriented: OrientedCloud, noise_m: float) -> FreeSpace | None:
     """What the stations saw through; None where none is known."""
     if not len(oriented.stations):
         return None
-    return free_space(oriented.cloud, oriented.stations, _VOID_DEG, _LOWEST_DEG, _SIGMAS * noise_m)
+    return free_space(oriented.cloud, oriented.stations, _VOID_DEG, LOWEST_DEG, _SIGMAS * noise_m)
 
 
 def _solved(known: signed_distance.Distances, origin: Float64, settings: Settings) -> Mesh | None:
