@@ -61,15 +61,7 @@ def test_points_too_far_apart_are_left_to_the_solve() -> None:
 
 def test_a_board_ends_where_beams_went_on_past_it() -> None:
     low, high = np.array([-0.6, 1.6, 1.175]), np.array([0.6, 2.0, 1.2])
-    parts, normals = [], []
-    for eye in EYES:
-        way = beams(0.4).reshape(-1, 3)
-        reach = ranges(eye, way, inside(*ROOM), solid(low, high))
-        points = eye + way * reach[:, None]
-        parts.append(points)
-        normals.append(inward(points, low, high))
-    given = OrientedCloud(cloud_of(parts), np.concatenate(normals), EYES)
-    mesh = auto.auto(given, SETTINGS).mesh
+    mesh = auto.auto(scanned(low, high), SETTINGS).mesh
     found = mesh.vertices
     ends = found[borders(mesh)].reshape(-1, 3)
     assert not ((ends > low - 0.3) & (ends < high + 0.3) & (ends < ROOM[1])).all(axis=1).any()
@@ -78,6 +70,27 @@ def test_a_board_ends_where_beams_went_on_past_it() -> None:
     wall_m = (ROOM[1] - found).min(axis=1)
     watched = found[beside & (outside_m > 0.008) & (wall_m > 0.008)]
     assert not len(watched) or not np.any([went_on_past(watched, eye, low, high) for eye in EYES])
+
+
+def test_beams_of_nobody_cut_nothing_back() -> None:
+    """A pillar's back, guessed to be in sight of both eyes, hollowed it."""
+    given = scanned(np.array([-0.2, -0.2, 0.0]), np.array([0.2, 0.2, 2.6]), merged=True)
+    nowhere = replace(given, stations=np.empty((0, 3)))
+    found, alone = (auto.auto(each, SETTINGS).mesh for each in (given, nowhere))
+    assert np.array_equal(found.vertices, alone.vertices)
+    assert np.array_equal(found.faces, alone.faces)
+
+
+def scanned(low: np.ndarray, high: np.ndarray, *, merged: bool = False) -> OrientedCloud:
+    """What two eyes see of a room and a box in it."""
+    parts, normals = [], []
+    for eye in EYES:
+        way = beams(0.4).reshape(-1, 3)
+        reach = ranges(eye, way, inside(*ROOM), solid(low, high))
+        points = eye + way * reach[:, None]
+        parts.append(points)
+        normals.append(inward(points, low, high))
+    return OrientedCloud(cloud_of(parts, merged=merged), np.concatenate(normals), EYES)
 
 
 def went_on_past(places: np.ndarray, eye: np.ndarray, low: np.ndarray, high: np.ndarray) -> Any:

@@ -109,6 +109,22 @@ def test_a_rail_seen_from_one_side_is_found_and_a_wall_is_none() -> None:
 HANDRAIL_M = 0.02
 
 
+def test_a_stout_leg_is_found_where_points_lie_close() -> None:
+    """Four millimetres apart on 32: no direction in which its points alone run on."""
+    rng = np.random.default_rng(0)
+    count = 4000
+    height, angle = rng.uniform(0, 1.1, count), rng.uniform(-1.4, 1.4, count)
+    outward = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
+    raw = np.float32((0.016 + rng.normal(0, NOISE_M, count))[:, None] * outward)
+    raw[:, 2] = height
+    found, theirs = rods(planes_of(raw, outward), raw, np.ones(count, bool), 0.004)
+    assert len(found) == 1
+    assert abs(found[0].radius_m - 0.016) < 0.001
+    assert np.abs(found[0].axis[:, :2]).max() < 0.001
+    assert np.allclose(np.sort(found[0].axis[:, 2]), [0, 1.1], atol=0.02)
+    assert theirs.mean() > 0.99
+
+
 def handrail(turn: np.ndarray) -> np.ndarray:
     """Places of a handrail that winds up a shaft of a metre."""
     return np.stack([np.cos(turn), np.sin(turn), 0.4 * turn + 1], axis=1)

@@ -44,6 +44,31 @@ def test_what_lies_past_a_boards_end_is_free(beyond_m: float) -> None:
     assert depth_m.max() < beyond_m
 
 
+@pytest.mark.parametrize("lean_deg", [0.0, 17.0, 40.0, 90.0])
+def test_a_rim_is_straight_between_coarse_beams(lean_deg: float) -> None:
+    """Told by the nearest beam alone it was as ragged as these lie apart, 24 mm here."""
+    eye, step_deg, depth_m = np.array([0.3, 0.2, 1.4]), 0.66, 2.2
+    lean = np.radians(lean_deg)
+    along, out = np.array([np.cos(lean), np.sin(lean)]), np.array([-np.sin(lean), np.cos(lean)])
+    way = beams(step_deg, heading_deg=0.17).reshape(-1, 3)
+    reach = ranges(eye, way, inside(np.array([-9, -9, -1.0]), np.array([9, 9, 9.0])))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        board = depth_m / way[:, 0]
+        on = (board > 0) & ((board[:, None] * way[:, 1:]) @ out < 0)
+    reach[on] = board[on]
+    free = free_space(cloud_of([eye + way * reach[:, None]]), eye[None], 2.5, -60, 0.006)
+    rim = np.linspace(-0.6, 0.6, 300)
+    offset = np.linspace(-0.03, 0.03, 61)
+    sideways = rim[:, None, None] * along + offset[:, None] * out
+    places = np.concatenate([np.full((*sideways.shape[:2], 1), depth_m), sideways], axis=2) + eye
+    asked = places.reshape(-1, 3).astype(np.float32)
+    told = free.depth_m(asked, facing(asked, [-1, 0, 0])).reshape(len(rim), -1) > 0
+    ends_m = offset[np.argmax(told, axis=1)]
+    assert told.any(axis=1).all()
+    assert ends_m.std() < 0.004
+    assert np.abs(ends_m).max() < 0.013
+
+
 def test_the_board_itself_is_not() -> None:
     places = beside(-0.005)
     assert seen(0, 1).depth_m(places, facing(places, [0, -1, 0])).max() < 0

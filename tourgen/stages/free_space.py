@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.compiled import compiled
-from tourgen.geometry import Float32, Float64, PointCloud
+from tourgen.geometry import Float32, Float64, Int32, PointCloud
 from tourgen.neighbours import Grid, nearest_to
 from tourgen.stages.sift.views import View, views
 from tourgen.threads import in_parts
@@ -22,10 +22,13 @@ from tourgen.threads import in_parts
 LOWEST_DEG = -58.0
 """Lower edge of a scanner's field of view, as most have it."""
 _BEAMS = 6
-_AROUND = 8
-"""Beams among which those to both sides of a rim are looked for."""
-_SPARE_STEPS = 0.25
-"""How far a rim is thought to go on past the middle between beams, in their steps."""
+_AROUND = 20
+"""Beams by which the rim between them is drawn."""
+_HEM, _ROUND, _MIXED = np.float32(0.05), np.float32(1e-3), np.float32(0.12)
+"""Of the line that parts beams: what the farthest weighs; how flat a row of beams tells none; the
+share of them on its wrong side from which on it parts nothing."""
+_SPARE_STEPS = 0.1
+"""How far a rim is thought to go on past that line, in their steps."""
 _PART = 1 << 14
 _VOID_STEPS = 2.5
 _SAMPLE = 20_000
@@ -73,7 +76,8 @@ class FreeSpace:
     def depth_m(self, places: Float32, normals: Float32) -> Float32:
         """How deep places lie in what beams went through.
 
-        A rim runs half way between the beams that it stopped and those that went on past it. A
+        A rim runs straight, for a few beams, between those that it stopped and those that went on
+        past it; where no line parts them, half way between the nearest of either. A
         beam that ended on the very sheet which a place belongs to went past nothing: at a grazing
         angle it only met it farther on.
 
@@ -165,6 +169,7 @@ def _deepen(
     """Raise the depths of some places to what one station tells; see ``FreeSpace.depth_m``."""
     directions = beams[0]
     index, square = np.empty(_AROUND, np.int32), np.empty(_AROUND, np.float32)
+    kind, aside = np.empty(_AROUND, np.float32), np.empty((_AROUND, 2), np.float32)
     way, normal = np.empty(3, np.float32), np.empty(3, np.float32)
     for i in range(len(places)):
         way[:], normal[:] = places[i] - station, normals[i]
@@ -182,8 +187,54 @@ def _deepen(
             reach = range_m[index[k]]
             above = reach * (directions[index[k]] * normal).sum() - height
             if reach > distance + margin_m and above < -margin_m:
-                went_on = square[k]
+                went_on, kind[k] = square[k], 1
             else:
-                stopped = square[k]
-        middle = (np.sqrt(stopped) - np.sqrt(went_on)) / 2
-        depth_m[i] = max(depth_m[i], (middle - spare_rad) * distance)
+                stopped, kind[k] = square[k], -1
+        before, behind = np.sqrt(stopped), np.sqrt(went_on)
+        past = (before - behind) / 2
+        if abs(kind[:found].sum()) < found:
+            _set_aside(directions, index[:found], way, aside)
+            parted = _parted(kind[:found], aside, square)
+            past = past if np.isnan(parted) else min(max(parted, -behind), before)
+        depth_m[i] = max(depth_m[i], (past - spare_rad) * distance)
+
+
+@compiled
+def _set_aside(directions: Float32, index: Int32, way: Float32, aside: Float32) -> None:
+    """How far some directions lie to the right of a way and above it, radians."""
+    level = max(np.sqrt(way[0] ** 2 + way[1] ** 2), np.float32(1e-6))
+    x, y = -way[1] / level, way[0] / level
+    for k, j in enumerate(index):
+        off = directions[j] - way
+        aside[k, 0] = x * off[0] + y * off[1]
+        aside[k, 1] = level * off[2] - way[2] * (y * off[0] - x * off[1])
+
+
+@compiled
+def _parted(kind: Float32, aside: Float32, square: Float32) -> np.float32:
+    """How far the origin lies past the straight line that parts two kinds of places.
+
+    Fisher's, by least squares: nearer places count for more. Not a number where there is none,
+    since too many would lie on its wrong side, as about a thin board.
+    """
+    count = len(kind)
+    weight = _HEM + 1 - square[:count] / square[count - 1]
+    weight /= weight.sum()
+    x, y = aside[:count, 0], aside[:count, 1]
+    mean, mean_x, mean_y = (weight * kind).sum(), (weight * x).sum(), (weight * y).sum()
+    kind_off, x_off, y_off = weight * (kind - mean), x - mean_x, y - mean_y
+    xx, xy, yy = (
+        (weight * x_off * x_off).sum(),
+        (weight * x_off * y_off).sum(),
+        (weight * y_off * y_off).sum(),
+    )
+    xk, yk = (kind_off * x_off).sum(), (kind_off * y_off).sum()
+    size = xx * yy - xy * xy
+    if not size > _ROUND * xx * yy:
+        return np.float32(np.nan)
+    slope_x, slope_y = (yy * xk - xy * yk) / size, (xx * yk - xy * xk) / size
+    told = mean + slope_x * x_off + slope_y * y_off
+    if (weight * (told * kind < 0)).sum() > _MIXED:
+        return np.float32(np.nan)
+    past = mean - slope_x * mean_x - slope_y * mean_y
+    return np.float32(past / max(np.sqrt(slope_x**2 + slope_y**2), np.float32(1e-9)))

@@ -33,13 +33,15 @@ from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.voxels import voxel_groups
 
-VERSION = 11
+VERSION = 12
 _VOID_DEG = 0.75
 """Where six beams do not lie nearer in direction, nothing is known of what they went through."""
 _MOST_BEAMS = 10_000_000
 """Rims are told as finely as beams lie; more than these would only take memory."""
 _SIGMAS = 4.0
 """Of the noise, by which a beam must have gone on past a place."""
+_TOLD = 0.5
+"""The part of the points that must tell their station."""
 Mask = npt.NDArray[np.bool_]
 
 
@@ -105,10 +107,22 @@ def auto(oriented: OrientedCloud, settings: Settings) -> Chosen:
 
 
 def _free(oriented: OrientedCloud, noise_m: float) -> FreeSpace | None:
-    """What the stations saw through; None where none is known."""
-    if not len(oriented.stations):
+    """What the stations saw through; None where most points do not tell who measured them.
+
+    A beam guessed wrong goes through walls: of a stair's newel it left a thin shell.
+    """
+    cloud = oriented.cloud
+    told = (cloud.station >= 0) & (cloud.station < len(oriented.stations))
+    if told.mean() < _TOLD:
         return None
-    return free_space(oriented.cloud, oriented.stations, _VOID_DEG, LOWEST_DEG, _SIGMAS * noise_m)
+    return free_space(
+        cloud.take(told),
+        oriented.stations,
+        _VOID_DEG,
+        LOWEST_DEG,
+        _SIGMAS * noise_m,
+        _MOST_BEAMS,
+    )
 
 
 def _solved(known: signed_distance.Distances, origin: Float64, settings: Settings) -> Mesh | None:

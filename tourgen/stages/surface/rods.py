@@ -33,6 +33,7 @@ from tourgen.stages.surface.bent_rods import bent, traced
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.stages.surface.tubes import ON, RADII_M, WIDTH_TRUST, Rod, behind, fits
 from tourgen.symmetric import axes_of
+from tourgen.voxels import voxel_groups
 
 _REACH = 4.0
 """How far around a point its direction is taken from, in spacings."""
@@ -53,7 +54,10 @@ _CROWDED, _HOPELESS = 0.35, 0.6
 """The part of its length along which a rod may pass other points, and a stick before the fit."""
 _STRAYS = 0.1
 """The part of the points at one place that may be others, and do not crowd it."""
-_GAP = 6.0
+_APART_M = 0.022
+"""How far apart points are taken where they lie closer than half of it: on a leg of 32 mm, points
+4 mm apart are spread as much across as along."""
+_GAP = 9.0
 """Longest stretch without a point, in spacings."""
 _FLANK, _FLANK_M = 2.0, 0.08
 """How far aside a row of points on a surface has others on it, in the spacing of these; at most."""
@@ -78,8 +82,38 @@ def rods(
     Returns:
         The rods, and the mask of the points that are theirs.
     """
-    at = np.flatnonzero(rest)
     tree = cKDTree(raw, compact_nodes=False, balanced_tree=False)  # asked for a few places only
+    if spacing_m > _APART_M / 2:
+        return _rods(planes, raw, rest, tree, spacing_m)
+    return _of_dense(planes, raw, rest, tree)
+
+
+def _of_dense(
+    planes: TangentPlanes, raw: Float32, rest: Mask, tree: cKDTree
+) -> tuple[tuple[Rod, ...], Mask]:
+    """The same where points lie close: looked for among some of them, fitted to all."""
+    order, starts = voxel_groups(raw, _APART_M)
+    some = np.sort(order[starts])
+    told, _ = _rods(planes.take(some), raw[some], rest[some], cKDTree(raw[some]), _APART_M)
+    taken = np.zeros(len(raw), bool)
+    found = []
+    for rough in told:
+        at = np.flatnonzero(rest & ~taken)
+        own = at[_beside(rough, raw[at], _APART_M / 4)]
+        rod = _fitted(raw[own], planes.normals[own], planes.noise_m, _APART_M) or rough
+        on = taken.copy()
+        on[at[np.abs(rod.of(raw[at])[1]) < ON * planes.noise_m]] = True
+        if _crowding(rod, tree, on, _APART_M) < _CROWDED:
+            found.append(rod)
+            taken[at[_beside(rod, raw[at], ON * planes.noise_m)]] = True
+    return tuple(found), taken
+
+
+def _rods(
+    planes: TangentPlanes, raw: Float32, rest: Mask, tree: cKDTree, spacing_m: float
+) -> tuple[tuple[Rod, ...], Mask]:
+    """The rods that points so far apart tell, and which are theirs; ``tree`` holds the points."""
+    at = np.flatnonzero(rest)
     taken = np.zeros(len(raw), bool)
 
     def crowding(rod: Rod, members: Ints) -> float:
