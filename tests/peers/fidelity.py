@@ -22,7 +22,8 @@ import report
 from aims import ORACLE, PANORAMAS, short_of
 from bench import Bench, reported_inferred
 from contestants import Contestant
-from results import PUBLISHED, RoomResult, Sheet, Try, save, saved
+from exact import exact
+from results import EXACT, PUBLISHED, RoomResult, Sheet, Try, save, saved
 from rooms import GALLERY, BenchRoom, demo_rooms, gallery
 from surface_score import Figures, best
 from thinned import POINTS, ROOM, thinned_room, thinned_tour
@@ -125,6 +126,8 @@ def _judged(room: BenchRoom, given: argparse.Namespace) -> RoomResult:
         one = contestants.published(PUBLISHED, given.tour / "site", room.id)
         columns[PUBLISHED] = one, bench.surface(one)
     columns |= _drawn(tour, bench, given.method or contestants.methods(), refused)
+    if not given.method:
+        columns |= _exact(tour, bench, refused)
     before = _before(room.id, given)
     left_out = given.skip_peers or given.keep_peers
     found, failed = ([], {}) if left_out else contestants.peers(room, given.scratch)
@@ -173,6 +176,18 @@ def _drawn(
             one = Contestant(method, "", (file,), None, room)
             columns[method] = one, bench.surface(one)
     return columns
+
+
+def _exact(tour: Tour, bench: Bench, refused: dict[str, str]) -> dict[str, Column]:
+    """A room from exact points."""
+    room, truth = bench.room.id, bench.reference.truth
+    print(f"{room}: {EXACT} ...", flush=True)
+    file = exact(tour, room, (truth.vertices, truth.faces), bench.scratch)
+    if isinstance(file, str):
+        refused[EXACT] = file
+        return {}
+    one = Contestant(EXACT, "", (file,), None, room)
+    return {EXACT: (one, bench.surface(one))}
 
 
 def _told(columns: dict[str, Column]) -> dict[str, str]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from surface_score import Figures
 
-PUBLISHED = "published"
+PUBLISHED, EXACT = "published", "exact"
 OURS = (PUBLISHED, "auto")
 """Who has to beat the peers; the first that there is."""
 DUELS = ("f_score_5mm", "psnr_db")
@@ -81,8 +81,8 @@ class RoomResult:
 
     @property
     def methods(self) -> list[str]:
-        """Our methods that drew a surface."""
-        others = (*self.settings, PUBLISHED)
+        """Our methods that drew a surface from the scan."""
+        others = (*self.settings, PUBLISHED, EXACT)
         return [
             name for name, each in self.columns.items() if name not in others and DUELS[0] in each
         ]

@@ -82,7 +82,7 @@ def drawn(tour: Tour, room: str, method: str, scratch: Path) -> Path | str:
     """
     surface = tour.room(room).surface.model_copy(update={"method": method})
     variant = alone(tour, room, tour.folder, surface=surface)
-    file = scratch / "drawn" / room / f"{method}-{_tasks(variant)['levels'].key[:16]}.npz"
+    file = scratch / "drawn" / room / f"{method}-{tasks_of(variant, room)['levels'].key[:16]}.npz"
     why = file.with_suffix(".txt")
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -94,7 +94,7 @@ def drawn(tour: Tour, room: str, method: str, scratch: Path) -> Path | str:
 
 
 def _draw(variant: Tour, file: Path, why: Path) -> None:
-    tasks, cache = _tasks(variant), Cache(variant.folder)
+    tasks, cache = tasks_of(variant, variant.start), Cache(variant.folder)
     wanted = RoomTasks(tuple(tasks[name] for name in _NEEDED), 0.0)
     outcome = run_missing({variant.start: wanted}, cache, Here(), _tell)[variant.start]
     if isinstance(outcome, TourgenError):
@@ -109,10 +109,11 @@ def _draw(variant: Tour, file: Path, why: Path) -> None:
     aside.rename(file)
 
 
-def _tasks(variant: Tour) -> dict[str, Task[Any]]:
-    """The stages of a tour's only room by name."""
-    (recipe,) = tour_recipes(variant, Cache(variant.folder))
-    return {each.name: each for each in in_order(recipe.goals)}
+def tasks_of(tour: Tour, room: str) -> dict[str, Task[Any]]:
+    """The stages of a room by name."""
+    recipes = tour_recipes(tour, Cache(tour.folder))
+    (goals,) = (recipe.goals for recipe in recipes if recipe.room.id == room)
+    return {each.name: each for each in in_order(goals)}
 
 
 def built(variant: Tour) -> Path | str:

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import aims
 import apart
+import exact
 import fidelity
 import numpy as np
 import picture_score
@@ -31,6 +32,7 @@ from gaps import Gaps
 from rooms import BenchRoom
 from true_picture import Shot
 
+from tourgen.geometry import OrientedCloud, PointCloud
 from tourgen.rays import ray_scene
 from tourgen.tour import load_tour
 
@@ -468,3 +470,29 @@ def test_a_run_of_some_methods_writes_nothing(
     assert command("--method", "poisson", score=0.75) == before
     assert "writes no docs: not all contestants are judged" in capsys.readouterr().out
     assert command("--room", "a").count("0.5000") == 2, "nor is it kept"
+
+
+def test_exact_points_lie_on_the_truth_and_look_as_they_did(truth: score.Truth) -> None:
+    rng = np.random.default_rng(0)
+    count, origin = 500, np.array([0.0, 0.0, 1.0])
+    floor = np.zeros((count, 3))
+    floor[:, :2] = rng.uniform(-1.5, 1.5, (count, 2))
+    raised = floor + np.array([0, 0, 0.004])
+    raised[-1, 2] = 0.4  # on no surface
+    normals = np.tile([0.0, 0.3, 1.0], (count, 1)) / np.hypot(0.3, 1)
+    normals[0] *= -1
+    cloud = PointCloud(
+        origin,
+        np.float32(raised - origin),
+        np.zeros((count, 3), np.uint8),
+        np.zeros(count, np.int16),
+    )
+    given = OrientedCloud(cloud, normals, np.zeros((1, 3)))
+    found = exact.exact_points(given, (truth.vertices, truth.faces))
+    places = found.cloud.points + origin
+    assert np.abs(places[:-1] - floor[:-1]).max() < 1e-5
+    assert np.allclose(found.normals[1:-1], [0, 0, 1], atol=1e-6)
+    assert np.allclose(found.normals[0], [0, 0, -1], atol=1e-6)
+    assert np.array_equal(places[-1], (cloud.points + origin)[-1])
+    assert np.array_equal(found.normals[-1], normals[-1])
+    assert np.abs(cloud.points + origin - raised).max() < 1e-6
