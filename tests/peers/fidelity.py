@@ -253,6 +253,8 @@ def _published_beside(tour: Tour, bench: Bench, given: argparse.Namespace) -> di
         link(folder / "scans", given.tour / "scans")
         scan = scanned(tour, room, f"scans/{room}.e57")
         sites[PANORAMAS] = built(alone(tour, room, folder, **scan))
+        print(f"{room}: {oracle.PANORAMAS} ...", flush=True)
+        sites[oracle.PANORAMAS] = oracle.built_with_panoramas(tour, room, given.scratch)
     return sites
 
 

@@ -44,9 +44,9 @@ def gallery_tour(gallery: Path, scratch: Path) -> Tour:
 
 
 def link(place: Path, target: Path) -> None:
-    """A folder that is another's."""
+    """A folder or file that is another's."""
     if not place.is_symlink():
-        place.symlink_to(target.resolve(), target_is_directory=True)
+        place.symlink_to(target.resolve(), target_is_directory=target.is_dir())
 
 
 def alone(tour: Tour, room: str, folder: Path, **changes: Any) -> Tour:
