@@ -214,11 +214,12 @@ def _pictured(
 ) -> list[Sheet]:
     """Add the figures of pictures to the columns that have colours; the sheets of all."""
     room = bench.room.id
-    for name, site in _published_beside(tour, bench, given).items():
+    for name, site in _published_beside(tour, bench, columns, given).items():
         if isinstance(site, str):
             refused[name] = site
         else:
-            columns[name] = contestants.published(name, site, room), {}
+            _, figures = columns.get(name, (None, {}))
+            columns[name] = contestants.published(name, site, room), figures
     budget = contestants.tiles_bytes(given.tour / "site", room)
     shown: dict[str, list[UInt8]] = {}
     for name, (one, figures) in columns.items():
@@ -241,11 +242,17 @@ def _pictured(
     ]
 
 
-def _published_beside(tour: Tour, bench: Bench, given: argparse.Namespace) -> dict[str, Path | str]:
+def _published_beside(
+    tour: Tour, bench: Bench, columns: dict[str, Column], given: argparse.Namespace
+) -> dict[str, Path | str]:
     """The sites that are built for their pictures alone."""
-    room = bench.room.id
+    room, truth, scratch = bench.room.id, bench.textured, given.scratch
     print(f"{room}: {ORACLE} ...", flush=True)
-    sites = {ORACLE: oracle.built_oracle(tour, bench.room, bench.textured, given.scratch)}
+    sites = {ORACLE: oracle.built_oracle(tour, bench.room, truth, scratch)}
+    if EXACT in columns:
+        print(f"{room}: pictures of {EXACT} ...", flush=True)
+        mesh = columns[EXACT][0].mesh
+        sites[EXACT] = oracle.built_exact(tour, bench.room, truth, mesh, scratch)
     if room in COLORED_BY_PANORAMAS:
         print(f"{room}: {PANORAMAS} ...", flush=True)
         folder = given.scratch / PANORAMAS / room
@@ -254,7 +261,7 @@ def _published_beside(tour: Tour, bench: Bench, given: argparse.Namespace) -> di
         scan = scanned(tour, room, f"scans/{room}.e57")
         sites[PANORAMAS] = built(alone(tour, room, folder, **scan))
         print(f"{room}: {oracle.PANORAMAS} ...", flush=True)
-        sites[oracle.PANORAMAS] = oracle.built_with_panoramas(tour, room, given.scratch)
+        sites[oracle.PANORAMAS] = oracle.built_with_panoramas(tour, bench.room, truth, scratch)
     return sites
 
 

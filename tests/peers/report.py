@@ -24,13 +24,13 @@ PREAMBLE = """Made by `make bench-fidelity` from the demo, and from the gallery 
 Every column is one surface of the same scan: `published` is the tour's site as it stands, then
 follow the methods of `room.surface.method`, each with this tour.toml as far as the finest level of
 detail; `exact`: drawn by the same stages from the same points, put on the true surface with its
-normals, so that what is lost there is lost for want of points; and the best of three settings of
-each peer. `oracle`: the scan's true points in true colours, baked onto the true mesh by the same
-stages; `panoramas`: the room published from its E57, coloured by the panoramas in it;
-`oracle-panoramas`: these on the true mesh. Peers get the scan cropped to the room, drop outliers by
-their own filter, find normals by their own, and have these turned towards the true stations for
-them; Poisson's invented surface is cut by density. In the pictures `scan` is the cloud as it came:
-before anything was done; `truth` is what there was to find.
+normals, in the scan's true colours, so that what is lost there is lost for want of points; and the
+best of three settings of each peer. `oracle`: the scan's true points in true colours, baked onto
+the true mesh by the same stages; `panoramas`: the room published from its E57, coloured by the
+panoramas in it; `oracle-panoramas`: these on the true mesh. Peers get the scan cropped to the room,
+drop outliers by their own filter, find normals by their own, and have these turned towards the true
+stations for them; Poisson's invented surface is cut by density. In the pictures `scan` is the cloud
+as it came: before anything was done; `truth` is what there was to find.
 
 - `precision` and `recall` at a distance are shares of the mesh near the truth, and of the truth
   that a station sees near the mesh; the F-score is their harmonic mean. Mesh over 30 mm behind
