@@ -2,7 +2,7 @@
 
 The points that were kept of the scan are put where the true surface is nearest to them, with its
 normals, and drawn by the same stages. What a figure lacks here, no better cleaning, smoothing or
-normals could give it: the beams lie too far apart, or nobody saw the place.
+normals could give to these: the beams lie too far apart, or nobody saw the place.
 """
 
 from __future__ import annotations

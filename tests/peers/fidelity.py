@@ -260,8 +260,8 @@ def _published_beside(
         link(folder / "scans", given.tour / "scans")
         scan = scanned(tour, room, f"scans/{room}.e57")
         sites[PANORAMAS] = built(alone(tour, room, folder, **scan))
-        print(f"{room}: {oracle.PANORAMAS} ...", flush=True)
-        sites[oracle.PANORAMAS] = oracle.built_with_panoramas(tour, bench.room, truth, scratch)
+        print(f"{room}: {oracle.WITH_PANORAMAS} ...", flush=True)
+        sites[oracle.WITH_PANORAMAS] = oracle.built_with_panoramas(tour, bench.room, truth, scratch)
     return sites
 
 

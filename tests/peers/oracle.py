@@ -25,7 +25,7 @@ from tourgen.simulation.output import write_ply
 from tourgen.tour import Tour
 
 SURFACE = 0
-NAME, PANORAMAS = "oracle", "oracle-panoramas"
+NAME, WITH_PANORAMAS = "oracle", "oracle-panoramas"
 _MESH = "scans/surface.ply"
 _NO_BOXES: dict[str, Any] = {"keep": None, "remove": (), "closed": ()}
 
@@ -94,7 +94,7 @@ def built_with_panoramas(
     tour: Tour, room: BenchRoom, truth: TexturedTruth, scratch: Path
 ) -> Path | str:
     """The site of a room's true surface in the colours of its E57's panoramas."""
-    folder, scan = scratch / PANORAMAS / room.id, f"scans/{room.id}.e57"
+    folder, scan = scratch / WITH_PANORAMAS / room.id, f"scans/{room.id}.e57"
     write_mesh(folder / _MESH, truth.vertices, truth.faces)
     link(folder / scan, tour.folder / scan)
     changes = scanned(tour, room.id, scan)

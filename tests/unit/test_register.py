@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -21,6 +23,11 @@ def pattern(points: np.ndarray) -> np.ndarray:
     x, y, z = points.T
     wave = np.sin(5 * x + 2) + np.sin(6 * y + 1) + np.sin(4 * z) + np.sin(3 * (x + y + z))
     return np.clip(128 + 25 * wave, 0, 255)
+
+
+Motion = tuple[np.ndarray, np.ndarray]
+"""Turn and shift."""
+Scan = Callable[[np.ndarray, int, int], np.ndarray]
 
 
 def box_scan(eye: np.ndarray, count: int, seed: int) -> np.ndarray:
@@ -44,11 +51,9 @@ def drum_scan(eye: np.ndarray, count: int, seed: int) -> np.ndarray:
     return eye + way * (reach + rng.normal(0, 0.002, count))[:, None]
 
 
-def scanned(
-    scan: object, stations: np.ndarray, moves: list[tuple[np.ndarray, np.ndarray]]
-) -> tuple[PointCloud, np.ndarray]:
+def scanned(scan: Scan, stations: np.ndarray, moves: list[Motion]) -> tuple[PointCloud, np.ndarray]:
     """What stations saw, each moved by (R, t) afterwards."""
-    parts = [scan(eye, 25_000, k) for k, eye in enumerate(stations)]  # type: ignore[operator]
+    parts = [scan(eye, 25_000, k) for k, eye in enumerate(stations)]
     light = np.concatenate([pattern(part) * (1 + 0.05 * k) for k, part in enumerate(parts)])
     colors = np.repeat(np.clip(light, 0, 255).astype(np.uint8)[:, None], 3, axis=1)
     points = np.concatenate(
@@ -61,7 +66,7 @@ def scanned(
     return PointCloud(np.zeros(3), np.float32(points), colors, station), places
 
 
-def motion(about: np.ndarray, turn_deg: list[float], shift_m: list[float]):  # type: ignore[no-untyped-def]
+def motion(about: np.ndarray, turn_deg: list[float], shift_m: list[float]) -> Motion:
     turn = Rotation.from_rotvec(np.radians(turn_deg)).as_matrix()
     return turn, about - turn @ about + np.array(shift_m)
 
@@ -69,20 +74,20 @@ def motion(about: np.ndarray, turn_deg: list[float], shift_m: list[float]):  # t
 STILL = (np.eye(3), np.zeros(3))
 
 
-def left_over(registered: register.Registered, moves: list[tuple[np.ndarray, np.ndarray]]):  # type: ignore[no-untyped-def]
+def left_over(registered: register.Registered, moves: list[Motion]) -> tuple[float, float]:
     """How far apart the room's middle comes out of each two stations, mm; and their turn, deg."""
     turns = [registered.rotations[k] @ turn for k, (turn, _) in enumerate(moves)]
     middles = [
         registered.rotations[k] @ (turn @ MIDDLE + shift) + registered.translations[k]
         for k, (turn, shift) in enumerate(moves)
     ]
-    gap = max(np.linalg.norm(a - b) for a in middles for b in middles)
+    gap = max(float(np.linalg.norm(a - b)) for a in middles for b in middles)
     twist = max(Rotation.from_matrix(a @ b.T).magnitude() for a in turns for b in turns)
-    return gap * 1000, np.degrees(twist)
+    return gap * 1000, float(np.degrees(twist))
 
 
 @pytest.mark.parametrize("scan", [box_scan, drum_scan])
-def test_stations_moved_apart_come_back(scan: object) -> None:
+def test_stations_moved_apart_come_back(scan: Scan) -> None:
     moves = [STILL, motion(STATIONS[1], [0.5, -0.5, 0.7], [0.03, -0.03, 0.026]), STILL]
     given, places = scanned(scan, STATIONS, moves)
     registered = register.register(given, places, SETTINGS)
