@@ -19,7 +19,7 @@ draw: then all of it is left to the solve, at full detail.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -30,10 +30,11 @@ from tourgen.rays import ray_scene
 from tourgen.stages.free_space import LOWEST_DEG, FreeSpace, free_space
 from tourgen.stages.mesh_arrays import face_areas, vertex_normals
 from tourgen.stages.surface import poisson, signed_distance
+from tourgen.stages.surface.footing import on_footing
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.voxels import voxel_groups
 
-VERSION = 12
+VERSION = 14
 _VOID_DEG = 0.75
 """Where six beams do not lie nearer in direction, nothing is known of what they went through."""
 _MOST_BEAMS = 10_000_000
@@ -103,6 +104,8 @@ def auto(oriented: OrientedCloud, settings: Settings) -> Chosen:
         return Chosen(poisson.poisson(oriented, settings.alone), 0.0)
     mesh = known.carried_on(_Closed(solved, ~near)).zero_set(oriented.cloud.origin)
     share = _share(mesh, _near(mesh, planes, reach_m))
+    if free:
+        shapes = replace(shapes, rods=on_footing(shapes.rods, mesh, free))
     return Chosen(shapes.with_rods(mesh, settings.distance), share)
 
 
