@@ -26,7 +26,7 @@ from tourgen.profile import require_profiler, write_flame_graph
 from tourgen.progress import Listener
 from tourgen.remote import has_fetched, is_remote, send
 from tourgen.report import tour_report
-from tourgen.site import BuiltRoom, write_site
+from tourgen.site import BuiltRoom, Made, write_site
 from tourgen.threads import cores
 from tourgen.tour import Link, Tour, Viewpoint
 from tourgen.unchanged import forget_build, remember_build
@@ -155,17 +155,28 @@ def _published(tour: Tour, rooms: Mapping[str, RoomResult]) -> list[BuiltRoom]:
         BuiltRoom(
             room.id,
             built.summary.origin,
-            built.summary.bounds[0],
-            built.summary.bounds[1],
+            built.summary.bounds,
             built.entry,
             tuple(_arrival(tour, link, room.id, rooms[link.to]) for link in room.links),
-            {**built.files, "poster.webp": built.poster},
-            built.summary.points_used,
-            built.summary.levels[-1].faces,
+            built.viewpoints,
+            built.plan,
+            {**built.files, **built.pictures},
+            _made(built),
         )
         for room in tour.rooms
         for built in [rooms[room.id]]
     ]
+
+
+def _made(room: RoomResult) -> Made:
+    summary, quality = room.summary, room.quality
+    return Made(
+        summary.points_used,
+        len(summary.stations),
+        summary.levels[-1].faces,
+        (quality.cloud_to_mesh_p50_mm, quality.cloud_to_mesh_p95_mm),
+        quality.inferred_area_ratio,
+    )
 
 
 def _arrival(tour: Tour, link: Link, source: str, target: RoomResult) -> View:

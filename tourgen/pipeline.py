@@ -33,6 +33,7 @@ from tourgen.stages import (
     normals,
     ownership,
     pack,
+    plan,
     poster,
     register,
     sift,
@@ -42,6 +43,7 @@ from tourgen.stages import (
     tiles,
     trim,
     unwrap,
+    viewpoints,
 )
 from tourgen.tasks import Task, in_order, missing_tasks, task, why
 from tourgen.tour import Room, Tour
@@ -56,8 +58,10 @@ class RoomRecipe:
         room: The room.
         scan_mb: Size of its scans, megabytes.
         files: Published files by path below the room's folder.
-        poster: Picture of the first view, WebP.
+        pictures: Files by name: of the first view, for previews, and of all around.
         entry: The first view.
+        plan: The room from above, and the ways out of it.
+        viewpoints: Where one stands before each note.
         quality: How well the surface follows the scan.
         summary: The room in figures.
     """
@@ -65,15 +69,25 @@ class RoomRecipe:
     room: Room
     scan_mb: float
     files: Task[Mapping[str, bytes]]
-    poster: Task[bytes]
+    pictures: Task[Mapping[str, bytes]]
     entry: Task[View]
+    plan: Task[plan.Plan]
+    viewpoints: Task[tuple[View, ...]]
     quality: Task[measure.Quality]
     summary: Task[picture.Summary]
 
     @property
     def goals(self) -> tuple[Task[Any], ...]:
         """All of them."""
-        return (self.files, self.poster, self.entry, self.quality, self.summary)
+        return (
+            self.files,
+            self.pictures,
+            self.entry,
+            self.plan,
+            self.viewpoints,
+            self.quality,
+            self.summary,
+        )
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -328,6 +342,24 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         version=poster.VERSION,
         libraries=("open3d", "pillow"),
     )
+    drawn = task(
+        "plan",
+        picture.planned,
+        simplified,
+        entered,
+        settings=picture.Marks(tuple(link.at for link in room.links)),
+        version=plan.VERSION,
+        libraries=("open3d", "shapely", "trimesh"),
+    )
+    looked_at = task(
+        "viewpoints",
+        picture.viewed,
+        simplified,
+        entered,
+        settings=picture.Marks(tuple(note.at for note in room.notes)),
+        version=viewpoints.VERSION,
+        libraries=("open3d",),
+    )
     measured = task(
         "measure",
         surface.measured,
@@ -351,7 +383,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         version=5,
     )
     scan_mb = sum(local(folder, each.file).stat().st_size for each in room.scans) / 1e6
-    return RoomRecipe(room, scan_mb, files, pictured, entered, measured, summary)
+    return RoomRecipe(room, scan_mb, files, pictured, entered, drawn, looked_at, measured, summary)
 
 
 @dataclass(frozen=True, slots=True)
@@ -361,8 +393,10 @@ class RoomResult:
     Attributes:
         id: The room.
         files: Published files by path below the room's folder.
-        poster: Picture of the first view, WebP.
+        pictures: Files by name: of the first view, for previews, and of all around.
         entry: The first view.
+        plan: The room from above, and the ways out of it.
+        viewpoints: Where one stands before each note.
         quality: How well the surface follows the scan.
         summary: The room in figures.
         costs: Of every stage, when it last ran, in the order of the recipe.
@@ -371,8 +405,10 @@ class RoomResult:
 
     id: str
     files: Mapping[str, bytes]
-    poster: bytes
+    pictures: Mapping[str, bytes]
     entry: View
+    plan: plan.Plan
+    viewpoints: tuple[View, ...]
     quality: measure.Quality
     summary: picture.Summary
     costs: Mapping[str, Cost]
@@ -448,9 +484,11 @@ def _result(recipe: RoomRecipe, cache: Cache, ran: set[str]) -> RoomResult | Non
     tasks = in_order(recipe.goals)
     cache.remember_ingredients(recipe.room.id, {each.name: each.ingredients for each in tasks})
     costs = _by_stage({each.name: cache.cost(each.key) or Cost(0, 0) for each in tasks})
-    files, picture_file, view, quality, summary = goals
     in_turn = tuple(stage for stage in costs if stage in ran)
-    return RoomResult(recipe.room.id, files, picture_file, view, quality, summary, costs, in_turn)
+    files, pictures, view, drawn, looked_at, quality, summary = goals
+    return RoomResult(
+        recipe.room.id, files, pictures, view, drawn, looked_at, quality, summary, costs, in_turn
+    )
 
 
 def _by_stage(costs: Mapping[str, Cost]) -> dict[str, Cost]:

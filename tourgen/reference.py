@@ -24,8 +24,10 @@ from tourgen.tour import (
     Clean,
     Link,
     Note,
+    Place,
     Room,
     ScanRef,
+    Stop,
     Surface,
     Texture,
     TourHead,
@@ -43,6 +45,8 @@ _TABLES: Final[tuple[tuple[str, type[BaseModel], str], ...]] = (
     ("[room.texture]", Texture, ""),
     ("[[room.link]]", Link, ""),
     ("[[room.note]]", Note, ""),
+    ("[[stop]]", Stop, "One for each stop of the guided tour, in their order."),
+    ("Places", Place, "The value of `place`:"),
     ("Boxes", Box, "The value of `keep`; `remove` and `closed` are lists of such boxes."),
     ("Views", Viewpoint, "The value of `start` and `arrive`."),
 )
@@ -121,7 +125,7 @@ def _words(annotation: object) -> str:
     if get_origin(annotation) is Literal:
         return ", ".join(f'`"{word}"`' for word in get_args(annotation))
     several = get_origin(annotation) is tuple
-    for name, model in (("box", Box), ("view", Viewpoint)):
+    for name, model in (("box", Box), ("view", Viewpoint), ("place", Place)):
         if model in (annotation, *get_args(annotation)):
             return f"list of {name}es" if several else name
     if several:

@@ -33,6 +33,7 @@ from tourgen.simulation.scanner import (
     share_of_returns,
     stations_of,
 )
+from tourgen.simulation.sea import sea
 from tourgen.simulation.stairs import stairs
 
 VERSION = 1
@@ -150,7 +151,7 @@ def simulate(folder: Path, rooms: Sequence[str], *, full: bool = False, e57: boo
         full: Whether chamber2 gets all its 15,224,042 points instead of a tenth.
         e57: Whether E57 files are written too.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    write_sea(folder)
     counts = FULL_POINTS if full else POINTS
     for room in rooms:
         stamp = folder / "truth" / f"{room}.made"
@@ -164,6 +165,13 @@ def simulate(folder: Path, rooms: Sequence[str], *, full: bool = False, e57: boo
         simulate_room(MODELS[room](), folder, Size(counts[room], e57=e57))
         stamp.write_text(words, encoding="utf-8")
         print(f"{room}: done in {time.perf_counter() - begun:.0f} s", flush=True)
+
+
+def write_sea(folder: Path) -> None:
+    """Write the sound of the sea that a note of the demo plays."""
+    file = folder / "sounds" / "sea.wav"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(sea())
 
 
 def _is_made(folder: Path, room: str, stamp: Path, words: str, *, e57: bool) -> bool:

@@ -9,15 +9,17 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from PIL import Image
 
-import tourgen.site as site_module
+import tourgen.site.swap as swap
 from tourgen.errors import InputError
 from tourgen.geometry import View
-from tourgen.site import BuiltRoom, is_site, restore_site, write_site
+from tourgen.site import BuiltRoom, Made, is_site, restore_site, write_site
+from tourgen.stages.plan import Plan, Storey
 from tourgen.tour import Tour, load_tour
 
 ORIGIN = np.array([100_000.0, 50_000.0, 12.0])
@@ -46,6 +48,9 @@ REPORT: dict[str, Any] = {
 }
 
 
+SQUARE = np.array([[-3, -3], [3, -3], [3, 3], [-3, 3]], np.float32)
+
+
 class Links(HTMLParser):
     """Every address that a page names."""
 
@@ -60,7 +65,12 @@ class Links(HTMLParser):
         self.found += [value for key in ("href", "src") if (value := values.get(key))]
         if values.get("property") == "og:image":
             self.found.append(values["content"] or "")
-        if (tag == "script" and "src" not in values) or tag == "style" or "style" in values:
+        is_data = values.get("type") == "application/ld+json"
+        if (
+            (tag == "script" and "src" not in values and not is_data)
+            or tag == "style"
+            or "style" in values
+        ):
             self.inline.append(tag)
 
 
@@ -79,17 +89,23 @@ def built(room: str, arrivals: int, mark: bytes = b"glTF") -> BuiltRoom:
     return BuiltRoom(
         id=room,
         origin=ORIGIN,
-        bounds_min=np.array([-3.0, -3, 0]),
-        bounds_max=np.array([3.0, 3, 2.5]),
+        bounds=np.array([[-3.0, -3, 0], [3.0, 3, 2.5]]),
         entry=view(0),
         arrivals=tuple(view(i + 1) for i in range(arrivals)),
+        viewpoints=tuple(view(i + 4) for i in range(arrivals)),
+        plan=Plan(
+            (Storey(0.0, (SQUARE,), (SQUARE[:3],), ()),),
+            np.zeros(arrivals),
+            np.tile([[0.0, 1.0]], (arrivals, 1)),
+        ),
         files={
             "tileset.json": json.dumps(tileset).encode(),
             "tiles/r.glb": mark,
             "poster.webp": picture(),
+            "preview.jpg": picture(),
+            "around.webp": picture(),
         },
-        points=1_302_317,
-        faces=250_000,
+        made=Made(1_302_317, 3, 250_000, (1.31, 4.92), 0.031),
     )
 
 
@@ -137,10 +153,17 @@ def viewer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dist = tmp_path / "dist"
     (dist / "draco-1").mkdir(parents=True)
     names = {"script": "viewer-1.js", "style": "style-1.css", "draco": "draco-1/"}
-    (dist / "manifest.json").write_text(json.dumps(names | {"icon": "icon.svg"}))
-    for name in ("viewer-1.js", "style-1.css", "icon.svg", "draco-1/draco_decoder.wasm"):
+    names_too = {"icon": "icon.svg", "soon": ["visit-1.js"]}
+    (dist / "manifest.json").write_text(json.dumps(names | names_too))
+    for name in (
+        "viewer-1.js",
+        "visit-1.js",
+        "style-1.css",
+        "icon.svg",
+        "draco-1/draco_decoder.wasm",
+    ):
         (dist / name).write_text("x")
-    monkeypatch.setattr(site_module, "_viewer", lambda: dist)
+    monkeypatch.setattr(swap, "viewer_folder", lambda: dist)
 
 
 def write(tour: Tour, out: Path, mark: bytes = b"glTF") -> None:
@@ -159,7 +182,7 @@ def test_tour_json_says_what_the_tour_file_and_the_build_say(tour: Tour, tmp_pat
     out = tmp_path / "site"
     write(tour, out)
     told = json.loads((out / "tour.json").read_text("utf-8"))
-    assert told["format"] == 1
+    assert told["format"] == 2
     assert told["title"] == {"en": "Light & sea", "fr": "Phare"}
     assert told["start"] == "hall"
     hall, loft = told["rooms"]
@@ -173,7 +196,7 @@ def test_tour_json_says_what_the_tour_file_and_the_build_say(tour: Tour, tmp_pat
     assert note["at"] == [0.5, 0.0, 1.0]
     assert note["text"]["fr"] == "<p>A <em>desk</em>.</p>"
     assert (out / note["image"]).read_bytes() == b"\xff\xd8picture"
-    assert hall["bytes"] == sum(map(len, built("hall", 1).files.values()))
+    assert hall["made"]["bytes"] == sum(map(len, built("hall", 1).files.values()))
 
 
 def test_texts_become_html_that_carries_none_of_the_author(tour: Tour, tmp_path: Path) -> None:
@@ -188,12 +211,13 @@ def test_every_address_is_relative_and_leads_to_a_file(tour: Tour, tmp_path: Pat
     write(tour, out)
     pages = sorted(out.rglob("*.html"))
     assert [str(page.relative_to(out)) for page in pages] == [
+        "404.html",
         "index.html",
         "report.html",
         "rooms/hall/index.html",
         "rooms/loft/index.html",
     ]
-    for page in pages:
+    for page in pages[1:]:  # the first is sent for addresses of any depth
         links = Links(page.read_text("utf-8"))
         assert not links.inline, f"{page}: the policy forbids what is inline"
         assert len(links.found) >= 4
@@ -208,7 +232,7 @@ def test_pages_stand_without_script(tour: Tour, tmp_path: Path) -> None:
     out = tmp_path / "site"
     write(tour, out)
     hall = (out / "rooms/hall/index.html").read_text("utf-8")
-    assert '<html lang="en">' in hall
+    assert '<html lang="en" dir="ltr" data-scheme="auto">' in hall
     assert "<title>Hall – Light &amp; sea</title>" in hall
     assert re.search(r'<meta name="description" content="The hall &amp; its', hall)
     assert "<h1>Hall</h1>" in hall
@@ -217,6 +241,74 @@ def test_pages_stand_without_script(tour: Tour, tmp_path: Path) -> None:
     start = (out / "index.html").read_text("utf-8")
     assert "<title>Light &amp; sea</title>" in start
     assert 'data-room="hall"' in start
+
+
+def test_previews_and_search_engines_are_told_where_it_is(tour: Tour, tmp_path: Path) -> None:
+    out = tmp_path / "site"
+    write(tour.model_copy(update={"address": "https://example.org/tour/"}), out)
+    page = (out / "rooms/hall/index.html").read_text("utf-8")
+    assert '<link rel="canonical" href="https://example.org/tour/rooms/hall/index.html">' in page
+    assert 'content="https://example.org/tour/rooms/hall/preview.jpg"' in page
+    (data,) = re.findall(r'ld\+json">(.*?)</script>', page)
+    assert json.loads(data)["containedInPlace"]["name"] == "Light & sea"
+    sitemap = (out / "sitemap.xml").read_text("utf-8")
+    assert ElementTree.fromstring(sitemap)[1][0].text == (
+        "https://example.org/tour/rooms/hall/index.html"
+    )
+    assert "Sitemap: https://example.org/tour/sitemap.xml" in (out / "robots.txt").read_text()
+    assert 'url=/tour/index.html#missing"' in (out / "404.html").read_text("utf-8")
+
+
+def test_notes_carry_sound_with_captions(tour: Tour, tmp_path: Path) -> None:
+    for name in ("sea.mp3", "sea.en.vtt", "sea.fr.vtt"):
+        (tour.folder / name).write_text(name)
+    file = tour.folder / "tour.toml"
+    added = 'image = "desk.jpg"\nsound = "sea.mp3"\ncaptions = "sea.{lang}.vtt"'
+    file.write_text(file.read_text("utf-8").replace('image = "desk.jpg"', added), "utf-8")
+    out = tmp_path / "site"
+    write(load_tour(tour.folder), out)
+    (note,) = json.loads((out / "tour.json").read_text("utf-8"))["rooms"][0]["notes"]
+    assert (out / note["sound"]).read_text() == "sea.mp3"
+    assert (out / note["captions"]["fr"]).read_text() == "sea.fr.vtt"
+    page = (out / "rooms/hall/index.html").read_text("utf-8")
+    assert '<track kind="captions" srclang="fr" src="../../rooms/hall/notes/1.fr.vtt">' in page
+
+
+def test_a_publisher_may_write_a_template_of_their_own(tour: Tour, tmp_path: Path) -> None:
+    own = tour.folder / "templates"
+    own.mkdir()
+    (own / "404.html").write_text("<p>{{ tour.title.en }} is elsewhere</p>", "utf-8")
+    out = tmp_path / "site"
+    write(tour, out)
+    assert (out / "404.html").read_text("utf-8") == "<p>Light &amp; sea is elsewhere</p>"
+    assert "<h1>Hall</h1>" in (out / "rooms/hall/index.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize("template", ["{% if %}", "{{ tuor.title }}"])
+def test_a_template_at_fault_is_told_and_nothing_is_lost(
+    tour: Tour, tmp_path: Path, template: str
+) -> None:
+    out = tmp_path / "site"
+    write(tour, out, b"first")
+    before = contents(out)
+    (tour.folder / "templates").mkdir()
+    (tour.folder / "templates/404.html").write_text(template, "utf-8")
+    with pytest.raises(InputError, match=r"`templates/404\.html`: expected a template"):
+        write(tour, out, b"second")
+    assert contents(out) == before
+
+
+def test_where_nothing_else_is_said_the_guide_goes_from_note_to_note(
+    tour: Tour, tmp_path: Path
+) -> None:
+    write(tour, tmp_path / "site")
+    told = json.loads((tmp_path / "site/tour.json").read_text("utf-8"))
+    assert [(stop["room"], stop["text"]["en"]) for stop in told["stops"]] == [
+        ("hall", "The hall & its <script>alert(1)</script> door. [more](javascript:alert(1))"),
+        ("hall", "Desk. A desk."),
+        ("loft", "loft"),
+    ]
+    assert told["stops"][1]["position"] == [4, 0, 1.6]
 
 
 def test_the_report_is_set_as_a_page(tour: Tour, tmp_path: Path) -> None:
@@ -262,7 +354,7 @@ def test_a_killed_build_loses_nothing(
 
     with monkeypatch.context() as patch:
         if moment == "while writing":
-            patch.setattr(site_module, "headers_file", killed)
+            patch.setattr(swap, "headers_file", killed)
         else:
             patch.setattr(Path, "rename", killed_between)
         with pytest.raises(KilledError):

@@ -6,7 +6,7 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -28,15 +28,32 @@ from tourgen.geometry import (
 )
 from tourgen.neighbours import Neighbours
 from tourgen.scans import ReadFacts
-from tourgen.stages import bake, entry, inferred, levels, pack, poster, register, sift, unwrap
+from tourgen.stages import (
+    bake,
+    entry,
+    inferred,
+    levels,
+    pack,
+    plan,
+    poster,
+    register,
+    sift,
+    unwrap,
+    viewpoints,
+)
 from tourgen.stages.mesh_arrays import face_areas
 from tourgen.stages.spacing import FOURTH, Spacing, spacing_at
 from tourgen.tileset import tileset_json
 from tourgen.tour import Viewpoint
 
+if TYPE_CHECKING:
+    from PIL.Image import Image as Picture
+
 Item = TypeVar("Item")
 _ROOT_TEXELS = 500_000
 _POSTER_QUALITY = 82
+_PREVIEW = (1200, 630)
+"""As most of those who show previews of links ask for, pixels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +76,17 @@ class Entering:
 
     position: Corner | None
     look_at: Corner | None
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """Where the marks of a room's doors, or of its notes, hang, in the frame of its scans."""
+
+    at: tuple[Corner, ...]
+
+    def of(self, origin: Float64) -> Float64:
+        """(n, 3) metres from the room's origin."""
+        return np.asarray(np.array(self.at, np.float64).reshape(-1, 3) - origin)
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,15 +288,37 @@ def pictured(
     view: View,
     parts: tuple[tuple[TexturedMesh, ...], ...],
     settings: poster.Settings,
-) -> bytes:
-    """Render the first view from the finest level, as WebP."""
-    from PIL import Image
+) -> Mapping[str, bytes]:
+    """Render the first view from the finest level: for the page, for previews, and all around."""
+    from PIL import Image, ImageOps
 
     leaves = [each for tile, each in zip(room, chain(*parts), strict=True) if not tile.children]
+    first = Image.fromarray(poster.poster(leaves, view, settings))
+    preview = ImageOps.fit(first, _PREVIEW, Image.Resampling.LANCZOS)
+    around = Image.fromarray(poster.around(leaves, view, settings))
+    return {
+        "poster.webp": _encoded(first, "WEBP", method=6),
+        "preview.jpg": _encoded(preview, "JPEG", optimize=True, progressive=True),
+        "around.webp": _encoded(around, "WEBP", method=4),
+    }
+
+
+def _encoded(picture: Picture, form: str, **options: Any) -> bytes:
     stream = io.BytesIO()
-    picture = Image.fromarray(poster.poster(leaves, view, settings))
-    picture.save(stream, "WEBP", quality=_POSTER_QUALITY, method=6)
+    picture.save(stream, form, quality=_POSTER_QUALITY, **options)
     return stream.getvalue()
+
+
+def planned(simplified: levels.Levels, view: View, doors: Marks) -> plan.Plan:
+    """Draw the room's plan, and tell which way its doors lead."""
+    mesh = simplified.finest
+    return plan.plan(mesh, view.position, doors.of(mesh.origin), plan.Settings())
+
+
+def viewed(simplified: levels.Levels, view: View, notes: Marks) -> tuple[View, ...]:
+    """Where one stands before each note."""
+    mesh = simplified.finest
+    return viewpoints.viewpoints(mesh, notes.of(mesh.origin), view, viewpoints.Settings())
 
 
 def summarised(

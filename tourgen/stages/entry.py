@@ -11,10 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tourgen.geometry import Float64, Mesh, View
-from tourgen.rays import ray_scene, rays_of
+from tourgen.rays import cast, ray_scene
 
 VERSION = 2
 _STEP_M = 0.5
@@ -79,7 +78,7 @@ def _longest(
         axis=-1,
     )
     ways = heading.reshape(-1, 3)
-    depth, front = _cast(scene, np.broadcast_to(eye, ways.shape), ways)
+    depth, front = cast(scene, np.broadcast_to(eye, ways.shape), ways)
     depth[np.isinf(depth)] = 0  # out of a door: nothing to see
     depth, front = depth.reshape(azimuth.shape), front.reshape(azimuth.shape)
     hit = depth > 0
@@ -105,15 +104,8 @@ def _grid(mesh: Mesh) -> Float64:
 
 def _eyes(scene: Any, places: Float64, eye_m: float) -> Float64:
     """Eyes over the floor below each place, where that floor is near the lowest."""
-    drop, _ = _cast(scene, places, np.broadcast_to([0.0, 0.0, -1.0], places.shape))
+    drop, _ = cast(scene, places, np.broadcast_to([0.0, 0.0, -1.0], places.shape))
     found = np.isfinite(drop)
     eyes = places[found]
     eyes[:, 2] += eye_m - drop[found]
     return np.asarray(eyes[eyes[:, 2] < eyes[:, 2].min(initial=np.inf) + _STEP_M])
-
-
-def _cast(scene: Any, start: Float64, direction: Float64) -> tuple[Float64, npt.NDArray[np.bool_]]:
-    """Distance to what (n, 3) rays hit, and whether they hit its front."""
-    hit = scene.cast_rays(rays_of(start, direction))
-    front = np.einsum("ij,ij->i", hit["primitive_normals"].numpy(), direction) < 0
-    return hit["t_hit"].numpy().astype(np.float64), front

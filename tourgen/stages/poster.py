@@ -1,8 +1,8 @@
-"""Poster: what a visitor sees on entering, rendered by ray casting, without GPU or browser.
+"""Poster: what a visitor sees on entering, and all around; by ray casting, without GPU or browser.
 
-Rays through Embree (Open3D's RaycastingScene) at twice the size each way, the pictures of the
-tiles read with bilinear blending, four rays averaged a pixel. Faces are seen
-from both sides, as in the viewer.
+Rays through Embree (Open3D's RaycastingScene), the pictures of the tiles read with bilinear
+blending, for the poster four rays averaged a pixel. Faces are seen from both sides, as in the
+viewer.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from tourgen.errors import StageError
 from tourgen.geometry import Float32, TexturedMesh, UInt8, View
 from tourgen.rays import rays_of
 
-VERSION = 4
+VERSION = 5
 
 _SAMPLES = 2  # rays a pixel along each axis
 _ROWS_AT_ONCE = 128
@@ -24,18 +24,20 @@ _ROWS_AT_ONCE = 128
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The picture.
+    """The pictures.
 
     Attributes:
-        width: Pixels.
-        height: Pixels.
-        field_of_view_deg: From the bottom to the top of the picture.
+        width: Of the poster, pixels.
+        height: Of the poster, pixels.
+        field_of_view_deg: From the bottom to the top of the poster.
+        around_width: Of the picture all around, pixels; it is half as high.
         void: sRGB where no surface is; that of the viewer, so that nothing jumps.
     """
 
     width: int = 1600
     height: int = 900
     field_of_view_deg: float = 65.0
+    around_width: int = 2048
     void: tuple[int, int, int] = (205, 216, 224)
 
 
@@ -53,8 +55,6 @@ def poster(tiles: Sequence[TexturedMesh], view: View, settings: Settings) -> UIn
     Raises:
         StageError: Where there is no tile.
     """
-    if not tiles:
-        raise StageError("poster: expected at least 1 tile, found 0")
     scene = _Scene(tiles)
     directions = _directions(view, settings)
     eye = view.position.astype(np.float32)
@@ -65,6 +65,37 @@ def poster(tiles: Sequence[TexturedMesh], view: View, settings: Settings) -> UIn
         colors = scene.look(eye, fine.reshape(-1, 3), settings.void)
         shape = (len(fine) // _SAMPLES, _SAMPLES, settings.width, _SAMPLES, 3)
         picture[rows] = colors.reshape(shape).mean((1, 3))
+    return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+
+
+def around(tiles: Sequence[TexturedMesh], view: View, settings: Settings) -> UInt8:
+    """Render all that is seen from one place, as an equirectangular picture.
+
+    Args:
+        tiles: Those to be seen.
+        view: The eye, and what shall be in the middle.
+        settings: See there.
+
+    Returns:
+        (around_width / 2, around_width, 3) uint8, sRGB; zenith at the top.
+
+    Raises:
+        StageError: Where there is no tile.
+    """
+    scene = _Scene(tiles)
+    width, height = settings.around_width, settings.around_width // 2
+    ahead = view.look_at - view.position
+    middle = np.arctan2(ahead[1], ahead[0])
+    azimuth = middle + np.pi - (np.arange(width) + 0.5) * (2 * np.pi / width)
+    elevation = np.pi / 2 - (np.arange(height) + 0.5) * (np.pi / height)
+    eye = view.position.astype(np.float32)
+    picture = np.empty((height, width, 3), np.float32)
+    for row, up in enumerate(elevation):
+        level = np.cos(up)
+        ways = np.stack(
+            [level * np.cos(azimuth), level * np.sin(azimuth), np.full(width, np.sin(up))], axis=1
+        )
+        picture[row] = scene.look(eye, ways.astype(np.float32), settings.void)
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 
@@ -90,6 +121,8 @@ class _Scene:
     def __init__(self, tiles: Sequence[TexturedMesh]) -> None:
         import open3d as o3d
 
+        if not tiles:
+            raise StageError("poster: expected at least 1 tile, found 0")
         self._scene = o3d.t.geometry.RaycastingScene()
         self._tiles: dict[int, TexturedMesh] = {}
         for tile in tiles:

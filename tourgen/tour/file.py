@@ -15,6 +15,7 @@ from tourgen.errors import Faults, InputError
 from tourgen.tour.faults import faults_of
 from tourgen.tour.scans import check_headers, check_scans
 from tourgen.tour.tables import TOUR_FILE, Room, Tour, TourFile
+from tourgen.tour.theme import load_theme
 from tourgen.tour.values import Context
 
 _READING_KEYS: Final = {"id", "scans", "unit", "up", "clean"}
@@ -39,23 +40,36 @@ def load_tour(folder: Path) -> Tour:
 
 
 def check_tour(folder: Path) -> tuple[Tour, tuple[str, ...]]:
-    """Read `folder`/tour.toml and the headers of all scans that it names rightly.
+    """Read `folder`/tour.toml, theme.toml and the headers of all scans that are named rightly.
 
     Returns:
         The tour, and what the publisher should know although a build will succeed.
 
     Raises:
-        Faults: All that is wrong: with tour.toml, in the order of the file, then with the scans.
+        Faults: All that is wrong: with tour.toml, in the order of the file, then with theme.toml
+            and with the scans.
     """
     data = _parse(folder / TOUR_FILE)
+    looks = _faults_of_theme(folder)
     try:
         file = TourFile.model_validate(data, context=_context(folder, data))
     except ValidationError as error:
         faults = _faults(error, data)
         scan_faults, _ = check_headers(_readable_rooms(folder, data), folder)
-        raise Faults((*faults, *scan_faults)) from None
+        raise Faults((*faults, *looks, *scan_faults)) from None
     tour = _tour(folder, file)
+    if looks:
+        scan_faults, _ = check_headers(tour.rooms, folder)
+        raise Faults((*looks, *scan_faults))
     return tour, check_scans(tour)
+
+
+def _faults_of_theme(folder: Path) -> tuple[InputError, ...]:
+    try:
+        load_theme(folder)
+    except Faults as faults:
+        return faults.faults
+    return ()
 
 
 def _faults(error: ValidationError, data: Mapping[str, Any]) -> tuple[InputError, ...]:
@@ -96,7 +110,12 @@ def _tour(folder: Path, file: TourFile) -> Tour:
         title=file.tour.title,
         languages=languages,
         start=file.tour.start or rooms[0].id,
+        north_deg=file.tour.north_deg,
+        credits=file.tour.credits,
+        license=file.tour.license,
+        address=file.tour.address,
         rooms=rooms,
+        stops=file.stop,
     )
 
 

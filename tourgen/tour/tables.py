@@ -25,9 +25,11 @@ from pydantic import (
 
 from tourgen.errors import InputError
 from tourgen.tour.values import (
+    Address,
     File,
     Form,
     Languages,
+    Moment,
     NeighbourRef,
     Number,
     OnlyWith,
@@ -80,6 +82,20 @@ class Viewpoint(_Table):
         if self.position == self.look_at:
             raise fault("expected `look_at` away from `position`, found both at one place")
         return self
+
+
+class Place(_Table):
+    """Where a room stands in its building."""
+
+    at: Position = Field(
+        description="Where the origin of the room's coordinates lies in the building, metres."
+    )
+    turn_deg: Number = Field(
+        default=0.0,
+        ge=-360,
+        le=360,
+        description="By how much the room is turned, counter-clockwise seen from above.",
+    )
 
 
 class ScanRef(_Table):
@@ -267,6 +283,24 @@ class Note(_Table):
     title: Text = Field(description="What the mark says.")
     text: Text | None = Field(default=None, description="What opens on a click; Markdown.")
     image: File | None = Field(default=None, description="A picture shown with the text.")
+    image_text: Text | None = Field(
+        default=None,
+        description="What the picture shows, for those who do not see it. Left out: the title.",
+    )
+    sound: File | None = Field(
+        default=None, description="A sound played with the text: `.mp3`, `.m4a`, `.ogg`, `.wav`."
+    )
+    captions: TextFiles = Field(
+        default={},
+        description="What the sound says, WebVTT files; `{lang}` stands for the language.",
+    )
+
+    @field_validator("captions")
+    @classmethod
+    def _of_a_sound(cls, value: Mapping[str, str], info: ValidationInfo) -> Mapping[str, str]:
+        if value and info.data.get("sound", "") is None:
+            raise fault("expected a `sound` that they belong to, found none")
+        return value
 
 
 class Room(_Table):
@@ -309,6 +343,14 @@ class Room(_Table):
         default={},
         description="Markdown files about the room; `{lang}` stands for the language.",
     )
+    captured: Moment | None = Field(
+        default=None, description="When the room was scanned, a date or a date with a time."
+    )
+    place: Place | None = Field(
+        default=None,
+        description="Where the room stands in its building. Left out: where its doors say, each "
+        "door and the door back being one.",
+    )
     start: Viewpoint | None = Field(
         default=None,
         description="Where one enters, if not by a door. Left out: a free place is found.",
@@ -350,6 +392,40 @@ class TourHead(_Table):
     start: RoomRef | None = Field(
         default=None, description="The room in which the tour starts. Left out: the first one."
     )
+    north_deg: Number | None = Field(
+        default=None,
+        ge=-360,
+        le=360,
+        description="Where north is, counter-clockwise from the x axis of the building, which is "
+        "that of a room without `place.turn_deg`. Left out: plans show no north.",
+    )
+    credits: TextFiles = Field(
+        default={},
+        description="Markdown files that say who made the tour; `{lang}` stands for the language.",
+    )
+    license: Text | None = Field(
+        default=None, description='What others may do with it, as "CC BY 4.0".'
+    )
+    address: Address | None = Field(
+        default=None,
+        description="Where the tour will be published, `https://...`. Left out: no site map is "
+        "written, and pictures in previews of links are named relative to their page.",
+    )
+
+
+class Stop(_Table):
+    """A place where the guided tour stops."""
+
+    room: RoomRef = Field(description="The room, by its `id`.")
+    position: Position = Field(description="The eye, metres, in that room's coordinates.")
+    look_at: Position = Field(description="What the eye looks at, metres.")
+    text: Text | None = Field(default=None, description="What is told there.")
+    seconds: Number | None = Field(
+        default=None,
+        ge=1,
+        le=600,
+        description="How long the tour stays. Left out: as long as reading the text takes.",
+    )
 
 
 class TourFile(_Table):
@@ -357,6 +433,10 @@ class TourFile(_Table):
 
     tour: TourHead = Field(description="The tour as a whole.")
     room: tuple[Room, ...] = Field(min_length=1, description="The rooms.")
+    stop: tuple[Stop, ...] = Field(
+        default=(),
+        description="The guided tour. Left out: every room's entry and notes.",
+    )
 
 
 class Tour(_Table):
@@ -367,14 +447,24 @@ class Tour(_Table):
         title: By language.
         languages: The first one is shown first.
         start: Id of the room in which the tour starts.
+        north_deg: Where north is, counter-clockwise from the x axis of the building.
+        credits: Markdown files by language.
+        license: By language.
+        address: Where the tour will be published; ends with a slash.
         rooms: In the order of the file.
+        stops: Of the guided tour, as given.
     """
 
     folder: Path
     title: Mapping[str, str]
     languages: tuple[str, ...]
     start: str
+    north_deg: float | None
+    credits: Mapping[str, str]
+    license: Mapping[str, str] | None
+    address: str | None
     rooms: tuple[Room, ...]
+    stops: tuple[Stop, ...]
 
     def room(self, room_id: str) -> Room:
         """The room of that id.

@@ -13,8 +13,10 @@ import re
 import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import date, datetime
 from pathlib import Path
 from typing import Annotated, Final, Literal
+from urllib.parse import urlsplit
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandler, ValidationInfo
@@ -219,6 +221,27 @@ def _check_languages(value: tuple[str, ...]) -> tuple[str, ...]:
     return value
 
 
+def _check_moment(value: object) -> str:
+    if isinstance(value, datetime):
+        return value.isoformat(timespec="minutes")
+    if isinstance(value, date):
+        return value.isoformat()
+    raise fault(
+        f"expected a date such as 2026-05-12 or 2026-05-12T14:30:00, found {shown(value)}",
+        "without quotes" if isinstance(value, str) else "",
+    )
+
+
+def _check_address(value: str) -> str:
+    parts = urlsplit(value)
+    if parts.scheme not in ("http", "https") or not parts.netloc or parts.query or parts.fragment:
+        raise fault(
+            f"expected an address of a folder such as `https://example.org/tour/`, "
+            f"found {shown(value)}"
+        )
+    return value if value.endswith("/") else f"{value}/"
+
+
 @dataclass(frozen=True)
 class OnlyWith:
     """For a key that means something to some of the values of the `method` above it only."""
@@ -276,4 +299,6 @@ File = Annotated[str, AfterValidator(_check_file), Form("file name")]
 RoomId = Annotated[str, AfterValidator(_check_room_id), Form("name")]
 RoomRef = Annotated[str, AfterValidator(_check_target), Form("`id` of a room")]
 NeighbourRef = Annotated[str, AfterValidator(_check_neighbour), Form("`id` of a room")]
+Address = Annotated[str, AfterValidator(_check_address), Form("address")]
+Moment = Annotated[str, BeforeValidator(_check_moment), Form("date, or date and time")]
 Languages = Annotated[tuple[str, ...], AfterValidator(_check_languages)]
