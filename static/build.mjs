@@ -1,5 +1,6 @@
-// Bundles the viewer into dist/: script, style and Draco decoder under names that carry their
+// Bundles the viewer into dist/: scripts, style and Draco decoder under names that carry their
 // digest, so that they may be cached for ever, and manifest.json that says what they are called.
+// What a visit may never use lies in scripts of its own.
 import { createHash } from "node:crypto";
 import { copyFile, mkdir, readFile, rm, writeFile } from "node:fs/promises";
 import { basename, dirname, join } from "node:path";
@@ -21,9 +22,11 @@ for (const name of decoderFiles) await copyFile(join(decoder, name), join(dist, 
 await copyFile(join(here, "src/icon.svg"), join(dist, "icon.svg"));
 
 const { metafile } = await build({
-  entryPoints: { viewer: join(here, "src/main.ts"), style: join(here, "src/style.css") },
+  entryPoints: { viewer: join(here, "src/main.ts"), style: join(here, "src/page/style.css") },
   outdir: dist,
   entryNames: "[name]-[hash]",
+  chunkNames: "[name]-[hash]",
+  splitting: true,
   bundle: true,
   minify: true,
   format: "esm",
@@ -43,9 +46,26 @@ function nameOf(source) {
   throw new Error(`${source}: expected an output, found none`);
 }
 
+/** The outputs that the room needs as soon as the script runs, so that they can be asked for ahead. */
+function soonAfter(source) {
+  const found = new Set();
+  const follow = (path) => {
+    if (found.has(path)) return;
+    found.add(path);
+    for (const each of metafile.outputs[path].imports) {
+      if (each.kind === "import-statement") follow(each.path);
+    }
+  };
+  for (const [path, output] of Object.entries(metafile.outputs)) {
+    if (output.entryPoint === source) follow(path);
+  }
+  return [...found].map((path) => basename(path));
+}
+
 const manifest = {
   script: nameOf("src/main.ts"),
-  style: nameOf("src/style.css"),
+  soon: soonAfter("src/visit.ts"),
+  style: nameOf("src/page/style.css"),
   draco,
   icon: "icon.svg",
 };

@@ -6,7 +6,8 @@
  * `?background=ff00ff` colours the void, so that a hole shows. `window.tourgen` answers as below.
  */
 
-import { levelsOf, type Levels } from "./levels.ts";
+import type { Way } from "./address.ts";
+import { levelsOf, type Levels } from "./scene/levels.ts";
 import type { Triple } from "./tour.ts";
 
 export interface Diagnostics {
@@ -16,6 +17,8 @@ export interface Diagnostics {
   readonly ready: boolean;
   /** Nothing moves, nothing is being fetched, and the last picture shows all that the view asks for. */
   readonly idle: boolean;
+  /** Which way one sees. */
+  readonly see: Way;
   /** The eye, metres, room frame, z up. */
   readonly position: Triple;
   /** Where it looks, unit length, room frame. */
@@ -28,7 +31,14 @@ export interface Diagnostics {
     readonly bytes: number;
     /** Pictures drawn since the page was opened. */
     readonly frames: number;
+    /** On the graphics card. */
+    readonly textures: number;
+    readonly geometries: number;
   };
+  /** A headset shows the room. */
+  readonly isImmersed: boolean;
+  /** What was measured last, or null. */
+  readonly metres: number | null;
   /** Puts the eye at a place, through walls, floor or not. */
   teleport(position: Triple, lookAt: Triple): void;
 }

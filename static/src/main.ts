@@ -1,12 +1,13 @@
 /** The viewer's entry: reads what the page says, opens its room, or shows the plain page. */
 
 import { element } from "./dom.ts";
-import { fetchTour, roomOf } from "./tour.ts";
-import { Visit } from "./visit.ts";
+import { fetchTour, roomCalled, startOf } from "./tour.ts";
 import { chooseLanguage, wordsIn } from "./words.ts";
 
 /** The decoder's folder beside this script; the bundler fills it in. */
 declare const DRACO_FOLDER: string;
+
+const PATIENCE_MS = 500;
 
 async function main(): Promise<void> {
   const host = document.getElementById("tour");
@@ -23,14 +24,33 @@ async function main(): Promise<void> {
     return;
   }
   keepIcon();
+  await quiet(host);
   const decoder = new URL(DRACO_FOLDER, import.meta.url);
-  new Visit(host, site, decoder, tour, roomOf(tour, host.dataset["room"] ?? null)).start();
+  const asked = roomCalled(tour, host.dataset["room"] ?? null);
+  const { Visit } = await import("./visit.ts");
+  new Visit(host, site, decoder, tour, asked ?? startOf(tour)).start(asked === null);
 }
 
 /** The page's address will change with the rooms; what it names relatively must not. */
 function keepIcon(): void {
   const icon = document.querySelector<HTMLLinkElement>("link[rel=icon]");
   if (icon) icon.href = new URL(icon.href).href;
+}
+
+/** Waits until the page stands and nothing else is to be done, or the visitor asks for the room. */
+function quiet(host: HTMLElement): Promise<void> {
+  return new Promise((done) => {
+    const start = (): void => done();
+    for (const asked of ["pointerdown", "keydown", "focusin"]) {
+      host.ownerDocument.addEventListener(asked, start, { once: true, passive: true });
+    }
+    const idle = (): void => {
+      if ("requestIdleCallback" in window) requestIdleCallback(start, { timeout: PATIENCE_MS });
+      else setTimeout(start, 0); // Safari
+    };
+    if (document.readyState === "complete") idle();
+    else window.addEventListener("load", idle, { once: true });
+  });
 }
 
 function canDraw(): boolean {

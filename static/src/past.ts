@@ -1,23 +1,4 @@
-/** What the browser keeps of a visit: where rooms were left, which language was chosen. */
-
-import type { Triple, View } from "./tour.ts";
-
-/** A room that was left, and how one stood in it. */
-export interface Left extends View {
-  readonly room: string;
-}
-
-/** What the present entry of the history says, if it is of ours. */
-export function leftAt(state: unknown): Left | null {
-  const left = state as Left | null;
-  return left && typeof left.room === "string" && isTriple(left.position) && isTriple(left.look_at)
-    ? left
-    : null;
-}
-
-function isTriple(value: unknown): value is Triple {
-  return Array.isArray(value) && value.length === 3 && value.every(Number.isFinite);
-}
+/** Which language was chosen before. */
 
 const LANGUAGE = "tourgen.language";
 

@@ -1,57 +1,80 @@
-/** A visit: one room after the other, and the loop that shows them. */
+/** A visit: one way of seeing after the other, room after room, and the loop that shows it all. */
 
-import { Raycaster, Vector2, Vector3, type LoadingManager } from "three";
-import { roomAddress, roomAt } from "./address.ts";
-import type { Collider, Hit } from "./collider.ts";
+import { Vector3, type LoadingManager, type Raycaster } from "three";
+import { hashOf, placeIn, roomAddress, roomAt, type Place, type Way } from "./address.ts";
+import type { Hit } from "./walk/collider.ts";
 import { readQuery, type Diagnostics } from "./diagnostics.ts";
-import { isTouch, prefersStillness } from "./dom.ts";
-import { Frontend } from "./frontend.ts";
-import { Keyboard } from "./keyboard.ts";
-import { Marker } from "./marker.ts";
-import type { Action } from "./notice.ts";
-import { chosenLanguage, chooseLanguageForGood, leftAt, type Left } from "./past.ts";
-import { Pointer } from "./pointer.ts";
-import { Prefetch } from "./prefetch.ts";
-import { RoomTiles, tileDecoder } from "./room-tiles.ts";
-import { Stage, type Pace } from "./stage.ts";
-import { Thresholds } from "./threshold.ts";
-import { roomOf, type Link, type Room, type Tour, type Triple, type View } from "./tour.ts";
-import { Visitor } from "./visitor.ts";
+import { prefersStillness } from "./dom.ts";
+import { Frontend } from "./page/frontend.ts";
+import { PlanSheet } from "./page/plan-sheet.ts";
+import { Tools } from "./tools.ts";
+import { Gamepads } from "./walk/gamepad.ts";
+import { Keyboard } from "./walk/keyboard.ts";
+import { Marker } from "./scene/marker.ts";
+import { chosenLanguage, chooseLanguageForGood } from "./past.ts";
+import { Pointer } from "./walk/pointer.ts";
+import { Rooms } from "./rooms.ts";
+import { tileDecoder } from "./scene/room-tiles.ts";
+import { Stage, type Pace } from "./scene/stage.ts";
+import { Thresholds } from "./walk/threshold.ts";
+import {
+  roomCalled,
+  startOf,
+  type Link,
+  type Note,
+  type Room,
+  type Stop,
+  type Tour,
+  type Triple,
+  type View,
+} from "./tour.ts";
+import { Visitor } from "./walk/visitor.ts";
 import { chooseLanguage } from "./words.ts";
+import type { Guide } from "./modes/guide.ts";
+import type { Immersive } from "./modes/immersive.ts";
+import type { Overview } from "./modes/overview.ts";
 
-const FADE_MS = 280;
 const ZOOM_STEP = 1.08;
 /** A click on a wall leads to the floor so far before it. */
 const BEFORE_WALL_M = 0.45;
 const FLOOR_MIN_RISE = 0.6;
 /** A sign may hang so deep in what stands behind it. */
 const SIGN_SLACK_M = 0.5;
-
-type Phase = "opening" | "open" | "failed";
+/** The address follows the view when it has rested for so long. */
+const REST_MS = 400;
+/** An address may name a place so far outside of a room. */
+const OUTSIDE_M = 3;
+const EYE_M = 1.6;
+/** A gamepad's button opens what hangs within so much of the middle of the picture. */
+const AIM_PX = 130;
 
 export class Visit {
   readonly #site: URL;
   readonly #tour: Tour;
   readonly #stage: Stage;
   readonly #front: Frontend;
-  readonly #decoder: LoadingManager;
   readonly #query = readQuery(location.search);
   readonly #marker = new Marker();
+  readonly #keyboard: Keyboard;
+  readonly #gamepads: Gamepads;
   readonly #visitor: Visitor;
   readonly #pointer: Pointer;
-  readonly #prefetch: Prefetch;
-  #room: Room;
-  #phase: Phase = "opening";
-  #tiles: RoomTiles | null = null;
-  #collider: Collider | null = null;
+  readonly #rooms: Rooms;
+  readonly #tools: Tools;
   #thresholds = new Thresholds<Link>([]);
-  /** Counts the rooms entered, so that what comes late for an earlier one is known. */
-  #entered = 0;
+  #way: Way = "walk";
+  #overview: Overview | null = null;
+  #sheet: PlanSheet | null = null;
+  #guide: Guide | null = null;
+  #immersive: Immersive | null = null;
+  #note: Note | null = null;
+  /** What shall be done once the room on the way is open. */
+  #then: (() => void) | null = null;
+  #rest: ReturnType<typeof setTimeout> | undefined;
 
   constructor(host: HTMLElement, site: URL, decoder: URL, tour: Tour, room: Room) {
     this.#site = site;
     this.#tour = tour;
-    this.#room = room;
     const wishes = [
       new URLSearchParams(location.search).get("lang"),
       chosenLanguage(),
@@ -62,138 +85,391 @@ export class Visit {
       door: (link) => this.#walkThrough(link),
       reached: (at) => this.#act(() => this.#visitor.face(new Vector3(...at))),
       chosen: (next) => this.#go(next, next.entry),
-      language: (tag) => {
-        chooseLanguageForGood(tag);
-        this.#stage.draw();
-      },
+      noted: (of, note, lead) => this.#open(of, note, lead),
+      closed: () => this.#closeNote(),
+      see: (way) => void this.#see(way),
+      guide: () => void this.#lead(),
+      search: () => void this.#tools.search(),
+      tools: () => this.#tools.list(),
+      language: (tag) => this.#speak(tag),
     });
     const canvas = this.#front.canvas;
     this.#stage = new Stage(canvas, this.#query.background, (dt) => this.#frame(dt));
     this.#stage.scene.add(this.#marker.group);
-    this.#decoder = tileDecoder(decoder);
-    this.#prefetch = new Prefetch(site, tour);
-    const keyboard = new Keyboard(window, () => this.#act(() => this.#visitor.stop()));
-    this.#visitor = new Visitor(keyboard, (door) => this.#pass(door));
+    const manager: LoadingManager = tileDecoder(decoder);
+    this.#rooms = new Rooms(
+      site,
+      tour,
+      room,
+      this.#stage,
+      this.#front,
+      manager,
+      this.#query.levels,
+      {
+        expected: (view) => {
+          this.#visitor.wait(view);
+          this.#aim();
+        },
+        opened: (of, view, collider) => {
+          this.#visitor.enter(view, collider, of.bounds);
+          this.#thresholds = new Thresholds(of.links);
+          this.#aim();
+          this.#standImmersed();
+          const then = this.#then;
+          this.#then = null;
+          then?.();
+        },
+        wanted: (next, view) => this.#go(next, view),
+      },
+    );
+    this.#keyboard = new Keyboard(window, () => this.#act(() => this.#takeOver()));
+    this.#gamepads = new Gamepads(
+      {
+        act: () => this.#front.spots.nearest(AIM_PX)?.click(),
+        back: () => this.#front.panel.close(),
+        previous: () => this.#guide?.go(this.#guide.at - 1),
+        next: () => this.#guide?.go(this.#guide.at + 1),
+      },
+      () => this.#stage.wake(),
+    );
+    this.#visitor = new Visitor(
+      () => this.#gamepads.wish() ?? this.#keyboard.wish(),
+      (door) => this.#pass(door),
+    );
+    this.#tools = new Tools({
+      tour,
+      stage: this.#stage,
+      front: this.#front,
+      rooms: this.#rooms,
+      address: () => this.#address(),
+      immerse: () => void this.#immerse(),
+      open: (of, note) => (note ? this.#open(of, note, true) : this.#go(of, of.entry)),
+    });
     this.#pointer = this.#listen(canvas);
     canvas.addEventListener("webglcontextlost", () =>
       this.#front.notice.tell(this.#front.words.contextLost, []),
     );
     canvas.addEventListener("webglcontextrestored", () => this.#front.notice.clear());
-    window.addEventListener("popstate", (event) => this.#returnTo(leftAt(event.state)));
+    window.addEventListener("popstate", () => this.#follow());
     window.tourgen = this.#diagnostics();
   }
 
-  /** Opens the first room, where it was left if this page was seen before. */
-  start(): void {
-    const left = leftAt(history.state);
-    void this.#enter(this.#room, left?.room === this.#room.id ? left : this.#room.entry, false);
+  /** Opens the first room, as the address says. */
+  start(isMissing: boolean): void {
+    const place = placeIn(location.hash);
+    this.#front.mark("walk");
+    this.#then = () => {
+      if (isMissing || location.hash === "#missing") this.#tell(this.#front.words.noPage);
+    };
+    this.#enter(this.#rooms.room, place, false);
   }
 
   // ------------------------------------------------------------------ rooms
 
-  async #enter(room: Room, view: View, passing: boolean): Promise<void> {
-    const turn = ++this.#entered;
-    this.#room = room;
-    this.#phase = "opening";
-    this.#marker.hide();
-    this.#front.expect(room, passing);
-    this.#visitor.stop();
-    if (this.#tiles && !prefersStillness()) await pause(FADE_MS);
-    if (turn !== this.#entered) return;
-    this.#leave();
-    const now = (act: () => void): void => {
-      if (turn === this.#entered) act();
+  /** Enters a room at a place of an address. */
+  #enter(room: Room, place: Place, passing: boolean): void {
+    this.#leaveWay();
+    const wrong = place.view !== null && !isInside(room, place.view.position);
+    const view = (wrong ? null : place.view) ?? room.entry;
+    const before = this.#then;
+    this.#then = () => {
+      before?.();
+      if (wrong) this.#tell(this.#front.words.noView);
+      const note = place.note === null ? undefined : room.notes[place.note - 1];
+      if (note) this.#open(room, note, place.view === null);
+      if (place.way !== "walk") void this.#see(place.way);
     };
-    const tileset = new URL(room.tileset, this.#site);
-    const { levels } = this.#query;
-    this.#tiles = new RoomTiles(tileset, this.#decoder, this.#stage.camera, levels, isTouch(), {
-      changed: () => now(() => this.#stage.draw()),
-      progress: (part) => now(() => this.#front.cover.progress(part)),
-      root: (collider) => now(() => this.#open(room, view, collider)),
-      failed: () => now(() => this.#fail(room, view)),
-      partFailed: () => now(() => this.#tellPartMissing()),
-    });
-    this.#stage.scene.add(this.#tiles.group);
-    this.#visitor.wait(view);
-    this.#aim();
-  }
-
-  #leave(): void {
-    if (!this.#tiles) return;
-    this.#stage.scene.remove(this.#tiles.group);
-    this.#tiles.dispose();
-    this.#tiles = null;
-    this.#collider = null;
-  }
-
-  #open(room: Room, view: View, collider: Collider): void {
-    this.#collider = collider;
-    this.#visitor.enter(view, collider, room.bounds);
-    this.#thresholds = new Thresholds(room.links);
-    this.#phase = "open";
-    this.#front.reveal();
-    this.#aim();
+    void this.#rooms.enter(room, view, passing);
   }
 
   #walkThrough(link: Link): void {
-    const collider = this.#collider;
-    if (collider) this.#act(() => this.#visitor.walkThrough(link, collider));
+    const collider = this.#rooms.collider;
+    if (!collider) return;
+    this.#takeOver();
+    this.#act(() => this.#visitor.walkThrough(link, collider));
   }
 
   /** Through a door. */
   #pass(link: Link): void {
-    const next = this.#tour.rooms.find(({ id }) => id === link.to);
-    if (next && this.#phase === "open") this.#go(next, link.arrive);
+    const next = roomCalled(this.#tour, link.to);
+    if (next && this.#rooms.isOpen) this.#go(next, link.arrive);
   }
 
   /** To another room's page, by its address. */
-  #go(room: Room, view: View): void {
-    const left: Left = { room: this.#room.id, ...this.#view() };
-    history.replaceState(left, "");
+  #go(room: Room, view: View, then: (() => void) | null = null): void {
+    this.#noteView();
     history.pushState(null, "", roomAddress(this.#site, room.id, location.search));
-    void this.#enter(room, view, true);
+    this.#leaveWay();
+    this.#then = then;
+    void this.#rooms.enter(room, view, true);
   }
 
-  #returnTo(left: Left | null): void {
-    const room = roomOf(this.#tour, left?.room ?? roomAt(this.#site, location.href));
-    void this.#enter(room, left ?? room.entry, true);
-  }
-
-  #fail(room: Room, view: View): void {
-    this.#phase = "failed";
-    const { words } = this.#front;
-    const ways: Action[] = [{ label: words.retry, act: () => void this.#enter(room, view, true) }];
-    if (room.id !== this.#tour.start) {
-      const start = roomOf(this.#tour, this.#tour.start);
-      ways.push({ label: words.back, act: () => this.#go(start, start.entry) });
+  /** Goes where the address says, after a step through the history or by hand. */
+  #follow(): void {
+    const room = roomCalled(this.#tour, roomAt(this.#site, location.href)) ?? startOf(this.#tour);
+    const place = placeIn(location.hash);
+    if (room !== this.#rooms.room || !this.#rooms.isOpen) this.#enter(room, place, true);
+    else {
+      if (place.way !== this.#way) void this.#see(place.way);
+      if (place.view && isInside(room, place.view.position)) this.#visitor.jump(place.view);
+      this.#aim();
+      const note = place.note === null ? undefined : room.notes[place.note - 1];
+      if (note && note !== this.#note) this.#open(room, note, place.view === null);
     }
-    this.#front.notice.tell(words.noRoom, ways, true);
   }
 
-  #tellPartMissing(): void {
-    const { words } = this.#front;
-    const retry = { label: words.retry, act: () => this.#tiles?.retry() };
-    this.#front.notice.tell(words.partMissing, [retry]);
+  /** Writes into the address how one sees, and from where. */
+  #noteView(): void {
+    clearTimeout(this.#rest);
+    if (!this.#rooms.isOpen) return;
+    const hash = hashOf(this.#place());
+    if (`#${hash}` !== location.hash) history.replaceState(history.state, "", `#${hash}`);
+  }
+
+  #place(): Place {
+    const note = this.#note ? this.#rooms.room.notes.indexOf(this.#note) + 1 : 0;
+    return { view: this.#view(), way: this.#way, note: note > 0 ? note : null };
+  }
+
+  #address(): string {
+    return roomAddress(this.#site, this.#rooms.room.id, location.search, this.#place());
+  }
+
+  #tell(message: string): void {
+    this.#front.notice.tell(message, [{ label: this.#front.words.close, act: () => undefined }]);
+  }
+
+  // ------------------------------------------------------------------ ways to see
+
+  /** Sees in another way. */
+  async #see(way: Way): Promise<void> {
+    if (way === this.#way || !this.#rooms.isOpen) return;
+    this.#takeOver();
+    const room = this.#rooms.room;
+    const before = this.#overview;
+    if (way === "walk" && before) {
+      await before.land(room, this.#visitor.view);
+      if (before !== this.#overview) return;
+    }
+    this.#leaveWay();
+    if (way === "walk") return this.#aim();
+    if (way === "plan") this.#showPlan();
+    else {
+      const { Overview } = await import("./modes/overview.ts");
+      if (room !== this.#rooms.room || this.#overview) return;
+      this.#overview = new Overview(
+        {
+          tour: this.#tour,
+          stage: this.#stage,
+          rooms: this.#rooms,
+          titleOf: (each) => this.#front.text(each.title),
+          wish: () => this.#gamepads.wish() ?? this.#keyboard.wish(),
+          enter: (into, view) => void this.#descend(into, view),
+        },
+        way === "dollhouse",
+      );
+      this.#front.showSigns(this.#overview.signs());
+    }
+    this.#way = way;
+    this.#front.mark(way);
+    this.#front.hideHint();
+    this.#stage.draw();
+    this.#noteView();
+  }
+
+  /** From outside down into a room. */
+  async #descend(room: Room, view: View): Promise<void> {
+    const overview = this.#overview;
+    await overview?.land(room, view);
+    if (overview !== this.#overview) return;
+    if (room !== this.#rooms.room) return this.#go(room, view);
+    this.#leaveWay();
+    this.#visitor.jump(view);
+    this.#aim();
+  }
+
+  #showPlan(): void {
+    const titleOf = (room: Room): string => this.#front.text(room.title);
+    this.#sheet = new PlanSheet(this.#tour, this.#front.words, titleOf, {
+      chosen: (room, at) => this.#goOnPlan(room, at),
+    });
+    this.#front.overlay.append(this.#sheet.element);
+    this.#sheet.stand(this.#rooms.room, this.#visitor.eye, this.#visitor.look.yaw);
+  }
+
+  #goOnPlan(room: Room, [x, y, z]: Triple): void {
+    const ahead = this.#visitor.look.direction();
+    const position: Triple = [x, y, z + EYE_M];
+    const view: View = { position, look_at: [x + ahead.x, y + ahead.y, z + EYE_M] };
+    if (room !== this.#rooms.room) return this.#go(room, view);
+    this.#leaveWay();
+    this.#visitor.jump(view);
+    this.#aim();
+  }
+
+  /** Takes away whatever stands between the visitor and walking. */
+  #leaveWay(): void {
+    this.#sheet?.element.remove();
+    this.#sheet = null;
+    if (this.#overview) {
+      this.#overview.leave();
+      this.#overview = null;
+      this.#front.showSigns();
+    }
+    this.#tools.end();
+    this.#way = "walk";
+    this.#front.mark("walk");
+    this.#marker.hide();
+  }
+
+  // ------------------------------------------------------------------ notes and the guide
+
+  /** @param lead Whether one is brought before it. */
+  #open(room: Room, note: Note, lead: boolean): void {
+    if (room !== this.#rooms.room) return this.#go(room, note.view, () => this.#open(room, note, false));
+    if (this.#way !== "walk") this.#leaveWay();
+    if (lead) {
+      this.#act(() => {
+        if (prefersStillness() || !this.#visitor.glide(note.view)) this.#visitor.jump(note.view);
+      });
+      this.#aim();
+    }
+    this.#front.openNote(note);
+    this.#note = note;
+    this.#noteView();
+  }
+
+  #closeNote(): void {
+    if (!this.#note) return;
+    this.#note = null;
+    this.#noteView();
+  }
+
+  async #lead(): Promise<void> {
+    if (this.#guide) return this.#guide.toggle();
+    const { Guide } = await import("./modes/guide.ts");
+    if (this.#guide) return;
+    if (this.#way !== "walk") this.#leaveWay();
+    this.#guide = new Guide(
+      {
+        stops: this.#tour.stops,
+        leadTo: (stop) => this.#leadTo(stop),
+        hasArrived: () => this.#rooms.isOpen && !this.#visitor.isUnderWay,
+        woken: () => this.#stage.wake(),
+        closed: () => this.#endGuide(),
+      },
+      this.#front.words,
+      (stop) => this.#front.text(stop.text),
+    );
+    this.#front.overlay.append(this.#guide.element);
+    this.#front.panel.close();
+    this.#front.hideHint();
+    const here = this.#tour.stops.findIndex(({ room }) => room === this.#rooms.room.id);
+    this.#guide.go(Math.max(0, here));
+  }
+
+  #leadTo(stop: Stop): void {
+    const room = roomCalled(this.#tour, stop.room);
+    if (!room) return;
+    if (room !== this.#rooms.room) this.#go(room, stop);
+    else if (this.#rooms.isOpen) {
+      this.#leaveWay();
+      if (prefersStillness() || !this.#visitor.glide(stop)) this.#visitor.jump(stop);
+      this.#aim();
+    }
+    this.#stage.wake();
+  }
+
+  #endGuide(): void {
+    this.#guide?.element.remove();
+    this.#guide = null;
+  }
+
+  /** The visitor acts: whatever moves by itself leaves off. */
+  #takeOver(): void {
+    this.#guide?.pause();
+    if (this.#visitor.isUnderWay) this.#visitor.stop();
+  }
+
+  // ------------------------------------------------------------------ virtual reality
+
+  async #immerse(): Promise<void> {
+    const { Immersive } = await import("./modes/immersive.ts");
+    const feet = this.#visitor.feet;
+    if (this.#immersive || !feet) return;
+    this.#leaveWay();
+    this.#endGuide();
+    try {
+      this.#immersive = await Immersive.begin(
+        {
+          stage: this.#stage,
+          rooms: this.#rooms,
+          text: (texts) => this.#front.text(texts),
+          step: () => this.#rooms.tiles?.update(this.#stage.camera, this.#stage.size),
+          pass: (link) => this.#pass(link),
+          ended: (view) => {
+            this.#immersive = null;
+            this.#visitor.jump(view);
+            this.#aim();
+          },
+        },
+        feet,
+        this.#visitor.look.yaw,
+      );
+    } catch (error) {
+      console.warn(error);
+      this.#tell(this.#front.words.noVr);
+    }
+  }
+
+  #standImmersed(): void {
+    const feet = this.#visitor.feet;
+    if (feet) this.#immersive?.stand(feet, this.#visitor.look.yaw);
+  }
+
+  #speak(language: string): void {
+    chooseLanguageForGood(language);
+    const url = new URL(location.href);
+    url.searchParams.set("lang", language);
+    history.replaceState(history.state, "", url);
+    this.#guide?.say(this.#front.words, (stop) => this.#front.text(stop.text));
+    this.#sheet?.say(this.#front.words);
+    this.#tools.say();
+    if (this.#overview) this.#front.showSigns(this.#overview.signs());
+    this.#stage.draw();
   }
 
   // ------------------------------------------------------------------ the loop
 
   /** One step of the loop. */
   #frame(dt: number): Pace {
-    const moved = this.#phase === "open" && this.#visitor.move(dt);
+    const moved = this.#overview ? this.#overview.frame(dt) : this.#walk(dt);
     if (moved) {
-      this.#aim();
-      const feet = this.#visitor.feet;
-      const door = feet && this.#thresholds.passed(feet);
-      if (door) this.#pass(door);
+      if (this.#overview) {
+        this.#overview.moved();
+        this.#stage.draw();
+      } else this.#aim();
     }
-    const tiles = this.#tiles;
+    const { tiles } = this.#rooms;
     tiles?.update(this.#stage.camera, this.#stage.size);
-    if (this.#phase === "open") this.#placeSigns();
-    const busy = tiles?.busy ?? false;
-    if (!busy && this.#phase === "open") void this.#prefetch.neighbours(this.#room);
+    if (this.#rooms.isOpen) this.#placeSigns();
+    this.#tools.frame();
+    const guided = this.#guide?.frame(dt) ?? false;
+    const busy = (tiles?.busy ?? false) || (this.#overview?.busy ?? false);
+    if (!busy && this.#rooms.isOpen) this.#rooms.lookAhead();
     if (moved) return "moving";
-    return busy && this.#phase !== "failed" ? "waiting" : "still";
+    if (guided) return "watching";
+    if (busy && !this.#rooms.hasFailed) return "waiting";
+    return this.#gamepads.isThere ? "watching" : "still";
+  }
+
+  #walk(dt: number): boolean {
+    if (!this.#rooms.isOpen || this.#sheet) return false;
+    const moved = this.#visitor.move(dt);
+    const feet = this.#visitor.feet;
+    const door = moved && feet && !this.#guide?.isPlaying ? this.#thresholds.passed(feet) : null;
+    if (door) this.#pass(door);
+    return moved;
   }
 
   /** Does something that may set the visitor moving. */
@@ -205,17 +481,22 @@ export class Visit {
 
   /** Looks through the visitor's eyes. */
   #aim(): void {
+    if (this.#overview || this.#immersive) return;
     this.#stage.aim(this.#visitor.eye, this.#visitor.look);
-    this.#tiles?.moved();
+    this.#rooms.tiles?.moved();
     this.#stage.draw();
+    this.#front.map.stand(this.#rooms.room, this.#visitor.eye, this.#visitor.look.yaw);
+    clearTimeout(this.#rest);
+    this.#rest = setTimeout(() => this.#noteView(), REST_MS);
   }
 
   #placeSigns(): void {
     const { camera, size } = this.#stage;
+    const outside = this.#overview !== null;
     this.#front.spots.place(
       camera,
       size,
-      (at) => this.#collider?.blocks(camera.position, at, SIGN_SLACK_M) ?? false,
+      (at) => !outside && (this.#rooms.collider?.blocks(camera.position, at, SIGN_SLACK_M) ?? false),
     );
   }
 
@@ -224,31 +505,39 @@ export class Visit {
   #listen(canvas: HTMLCanvasElement): Pointer {
     return new Pointer(canvas, {
       look: (dx, dy) => {
+        if (this.#overview) return this.#act(() => undefined);
+        this.#takeOver();
         const angle = this.#stage.pixelAngle;
         this.#visitor.turn(dx * angle, dy * angle);
         this.#aim();
       },
       click: (x, y) => {
-        const place = this.#placeAt(this.#pick(x, y));
+        const caster = this.#stage.caster(x, y);
+        if (this.#tools.click(caster)) return;
+        if (this.#overview) return this.#overview.click(caster);
+        const place = this.#placeAt(this.#cast(caster));
+        this.#takeOver();
         if (place) this.#act(() => this.#visitor.walkTo(place));
       },
       hover: (x, y) => this.#hover(x, y),
       leave: () => {
         if (this.#marker.hide()) this.#stage.draw();
       },
-      stick: (ahead, left) => this.#act(() => this.#visitor.setStick(ahead, left)),
+      stick: (ahead, left) => {
+        if (this.#overview) return this.#act(() => undefined);
+        this.#takeOver();
+        this.#act(() => this.#visitor.setStick(ahead, left));
+      },
       wheel: (sense) => {
+        if (this.#overview) return this.#act(() => undefined);
         this.#stage.zoom(ZOOM_STEP ** sense);
-        this.#tiles?.moved();
+        this.#rooms.tiles?.moved();
       },
     });
   }
 
-  #pick(x: number, y: number): Hit | null {
-    const { camera, size } = this.#stage;
-    const caster = new Raycaster();
-    caster.setFromCamera(new Vector2((x / size.x) * 2 - 1, 1 - (y / size.y) * 2), camera);
-    return this.#collider?.cast(caster.ray.origin, caster.ray.direction) ?? null;
+  #cast({ ray }: Raycaster): Hit | null {
+    return this.#rooms.collider?.cast(ray.origin, ray.direction) ?? null;
   }
 
   /** Where a click leads: to the floor that it hit, or to the foot of the wall. */
@@ -257,12 +546,13 @@ export class Visit {
     const place = hit.point.clone();
     if (isFloor(hit)) return place;
     place.addScaledVector(hit.normal, BEFORE_WALL_M);
-    const floor = this.#collider?.heightBelow(place.x, place.y, place.z);
+    const floor = this.#rooms.collider?.heightBelow(place.x, place.y, place.z);
     return place.setZ(floor ?? this.#visitor.feet?.z ?? place.z);
   }
 
   #hover(x: number, y: number): void {
-    const hit = this.#pointer.dragging ? null : this.#pick(x, y);
+    const idle = this.#pointer.dragging || this.#overview !== null || this.#tools.picks;
+    const hit = idle ? null : this.#cast(this.#stage.caster(x, y));
     const floor = hit && isFloor(hit) ? hit : null;
     this.#front.canvas.classList.toggle("on-floor", floor !== null);
     if (floor) this.#marker.show(floor.point, floor.normal);
@@ -272,40 +562,48 @@ export class Visit {
   // ------------------------------------------------------------------ diagnostics
 
   #view(): View {
-    const eye = this.#stage.camera.position;
-    return {
-      position: triple(eye),
-      look_at: triple(this.#visitor.look.direction().add(eye)),
-    };
+    return this.#visitor.view;
   }
 
   #diagnostics(): Diagnostics {
     const visit = this;
     return {
       get room() {
-        return visit.#room.id;
+        return visit.#rooms.room.id;
       },
       get ready() {
-        return visit.#phase === "open";
+        return visit.#rooms.isOpen;
       },
       get idle() {
-        return visit.#phase === "open" && visit.#stage.still && !(visit.#tiles?.busy ?? true);
+        const busy = (visit.#rooms.tiles?.busy ?? true) || (visit.#overview?.busy ?? false);
+        return visit.#rooms.isOpen && visit.#stage.still && !busy;
+      },
+      get see() {
+        return visit.#way;
       },
       get position() {
-        return visit.#view().position;
+        return triple(visit.#stage.camera.getWorldPosition(new Vector3()));
       },
       get look() {
-        return triple(visit.#visitor.look.direction());
+        return triple(visit.#stage.camera.getWorldDirection(new Vector3()));
       },
       get stats() {
-        const { render } = visit.#stage.renderer.info;
+        const { render, memory } = visit.#stage.renderer.info;
         return {
-          tiles: visit.#tiles?.tileCount ?? 0,
+          tiles: visit.#rooms.tiles?.tileCount ?? 0,
           triangles: render.triangles,
           drawCalls: render.calls,
-          bytes: visit.#tiles?.bytes ?? 0,
+          bytes: visit.#rooms.tiles?.bytes ?? 0,
           frames: render.frame,
+          textures: memory.textures,
+          geometries: memory.geometries,
         };
+      },
+      get isImmersed() {
+        return visit.#immersive !== null;
+      },
+      get metres() {
+        return visit.#tools.metres;
       },
       teleport(position, lookAt) {
         visit.#visitor.hover(new Vector3(...position), new Vector3(...lookAt));
@@ -319,10 +617,12 @@ function isFloor(hit: Hit): boolean {
   return hit.normal.z > FLOOR_MIN_RISE;
 }
 
-function triple({ x, y, z }: Vector3): Triple {
-  return [x, y, z];
+function isInside({ bounds: { min, max } }: Room, position: Triple): boolean {
+  return position.every(
+    (value, i) => value > (min[i] ?? 0) - OUTSIDE_M && value < (max[i] ?? 0) + OUTSIDE_M,
+  );
 }
 
-function pause(ms: number): Promise<void> {
-  return new Promise((done) => setTimeout(done, ms));
+function triple({ x, y, z }: Vector3): Triple {
+  return [x, y, z];
 }

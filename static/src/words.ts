@@ -1,51 +1,26 @@
 /** The viewer's own words, and which of the tour's languages a visitor gets. */
 
 import type { Texts } from "./tour.ts";
+import { ENGLISH, type Words } from "./words/en.ts";
+import { FRENCH } from "./words/fr.ts";
 
-const ENGLISH = {
-  loading: "Loading",
-  rooms: "Rooms",
-  about: "About this room",
-  language: "Language",
-  close: "Close",
-  doors: "Doors",
-  retry: "Try again",
-  back: "Back to the start",
-  view: "View of the room: drag to look around, arrow keys to walk",
-  hintMouse: "Drag to look around · click the floor or use the arrow keys to walk",
-  hintTouch: "Drag to look around · tap the floor to walk · two fingers to move",
-  noWebgl: "This browser cannot show the room in three dimensions. Its pictures and texts are below.",
-  noTour: "The tour could not be loaded.",
-  noRoom: "This room could not be loaded.",
-  partMissing: "A part of this room could not be loaded.",
-  contextLost: "The graphics of this device paused. The room comes back by itself.",
-};
+export type { Words } from "./words/en.ts";
 
-export type Words = typeof ENGLISH;
+const RIGHT_TO_LEFT = new Set(["ar", "dv", "fa", "he", "ps", "sd", "ug", "ur", "yi"]);
 
-const FRENCH: Words = {
-  loading: "Chargement",
-  rooms: "Salles",
-  about: "À propos de cette salle",
-  language: "Langue",
-  close: "Fermer",
-  doors: "Portes",
-  retry: "Réessayer",
-  back: "Revenir au début",
-  view: "Vue de la salle : glisser pour regarder, flèches pour marcher",
-  hintMouse: "Glisser pour regarder · cliquer le sol ou utiliser les flèches pour marcher",
-  hintTouch: "Glisser pour regarder · toucher le sol pour marcher · deux doigts pour avancer",
-  noWebgl:
-    "Ce navigateur ne peut pas montrer la salle en trois dimensions. Ses images et ses textes sont ci-dessous.",
-  noTour: "La visite n’a pas pu être chargée.",
-  noRoom: "Cette salle n’a pas pu être chargée.",
-  partMissing: "Une partie de cette salle n’a pas pu être chargée.",
-  contextLost: "L’affichage de cet appareil s’est interrompu. La salle revient d’elle-même.",
-};
+/** Which way a language is written, as the attribute `dir` says it. */
+export function directionOf(language: string): "ltr" | "rtl" {
+  return RIGHT_TO_LEFT.has(primary(language)) ? "rtl" : "ltr";
+}
 
 /** The viewer's words in `language`; English where it knows no better. */
 export function wordsIn(language: string): Words {
   return primary(language) === "fr" ? FRENCH : ENGLISH;
+}
+
+/** The visitor's own manner of a language, "en-GB" of "en", for numbers and dates. */
+export function mannerOf(language: string): string {
+  return navigator.languages.find((each) => primary(each) === primary(language)) ?? language;
 }
 
 /** The text in `language`, else in any language there is. */

@@ -33,7 +33,7 @@ export class Keyboard {
     target.addEventListener("keydown", (event) => {
       this.#fast = event.shiftKey;
       if (!(event.code in MOVES) || event.ctrlKey || event.altKey || event.metaKey) return;
-      if (keepsKeys(event.target)) return;
+      if (keepsKeys(event.target, event.code)) return;
       event.preventDefault();
       this.#down.add(event.code);
       wake();
@@ -43,10 +43,6 @@ export class Keyboard {
       this.#down.delete(event.code);
     });
     target.addEventListener("blur", () => this.#down.clear());
-  }
-
-  get active(): boolean {
-    return this.#down.size > 0;
   }
 
   wish(): Wish {
@@ -62,7 +58,12 @@ export class Keyboard {
   }
 }
 
-/** Whether the element uses such keys itself: a choice of languages, a panel that scrolls. */
-function keepsKeys(target: EventTarget | null): boolean {
-  return target instanceof Element && target.closest("select, input, textarea, .panel") !== null;
+/**
+ * Whether the element uses such keys itself: a choice of languages, a panel that scrolls. Letters
+ * walk only where nothing that could be meant by them has the focus.
+ */
+function keepsKeys(target: EventTarget | null, code: string): boolean {
+  if (!(target instanceof Element)) return false;
+  if (target.closest("select, input, textarea, audio, .panel, .plan-sheet")) return true;
+  return code.startsWith("Key") && target !== document.body && !(target instanceof HTMLCanvasElement);
 }

@@ -1,6 +1,6 @@
 /** Fetches the rooms next door ahead, so that a door opens at once. */
 
-import type { Room, Tour } from "./tour.ts";
+import type { Room, Tour } from "../tour.ts";
 
 interface TilesetRoot {
   readonly root: { readonly content?: { readonly uri: string } };

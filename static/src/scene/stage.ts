@@ -3,16 +3,17 @@
 import {
   Color,
   PerspectiveCamera,
+  Raycaster,
   Scene,
   Vector2,
   WebGLRenderer,
   type Vector3,
 } from "three";
-import type { Look } from "./look.ts";
+import type { Look } from "../walk/look.ts";
 import { Sharpness } from "./sharpness.ts";
 
-/** What a step of the loop asks for: more steps because one moves or waits, or none. */
-export type Pace = "moving" | "waiting" | "still";
+/** What a step of the loop asks for: more steps because one moves, watches or waits, or none. */
+export type Pace = "moving" | "watching" | "waiting" | "still";
 
 const PIXEL_RATIO_MAX = 2;
 /** A slow machine walks no slower down to four pictures a second. */
@@ -35,6 +36,7 @@ export class Stage {
   #sharp = 1;
   #zoom = 1;
   #scheduled = 0;
+  #isPaused = false;
   #before: number | null = null;
   #dirty = true;
 
@@ -71,7 +73,27 @@ export class Stage {
 
   /** Asks for a step of the loop; a picture is drawn only if something is found changed. */
   wake(): void {
+    if (this.#isPaused) return;
     if (this.#scheduled === 0) this.#scheduled = requestAnimationFrame((now) => this.#tick(now));
+  }
+
+  /** Leaves the loop to a headset, which asks for pictures at a pace of its own. */
+  pauseFor(frame: (now: number) => void): void {
+    cancelAnimationFrame(this.#scheduled);
+    this.#scheduled = 0;
+    this.#isPaused = true;
+    this.renderer.setAnimationLoop((now) => {
+      frame(now);
+      this.renderer.render(this.scene, this.camera);
+    });
+  }
+
+  /** Takes the loop back. */
+  resume(): void {
+    this.renderer.setAnimationLoop(null);
+    this.#isPaused = false;
+    this.#before = null;
+    this.#fit();
   }
 
   zoom(factor: number): void {
@@ -83,6 +105,22 @@ export class Stage {
     this.camera.position.copy(eye);
     this.camera.lookAt(look.direction().add(eye));
     this.camera.updateMatrixWorld();
+  }
+
+  /** A ray through a place of the picture, pixels from the upper left. */
+  caster(x: number, y: number): Raycaster {
+    const caster = new Raycaster();
+    const at = new Vector2((x / this.size.x) * 2 - 1, 1 - (y / this.size.y) * 2);
+    caster.setFromCamera(at, this.camera);
+    return caster;
+  }
+
+  /** Hands the picture out as a PNG. */
+  picture(take: (picture: Blob) => void): void {
+    this.renderer.render(this.scene, this.camera); // or what is drawn may be gone already
+    this.renderer.domElement.toBlob((picture) => {
+      if (picture) take(picture);
+    });
   }
 
   #tick(now: number): void {

@@ -2,13 +2,14 @@
 
 import { Vector3 } from "three";
 import type { Collider } from "./collider.ts";
-import { prefersStillness } from "./dom.ts";
+import { prefersStillness } from "../dom.ts";
 import { Errand } from "./errand.ts";
-import type { Keyboard } from "./keyboard.ts";
+import { Glide } from "./glide.ts";
+import type { Wish } from "./keyboard.ts";
 import { Look } from "./look.ts";
 import { planRoute } from "./route.ts";
-import type { Link, View } from "./tour.ts";
-import { Walker, type Bounds } from "./walker.ts";
+import type { Link, View } from "../tour.ts";
+import { EYE_M, Walker, type Bounds } from "./walker.ts";
 
 const WALK_M_S = 1.7;
 const RUN_M_S = 3.4;
@@ -23,24 +24,33 @@ const CUT_STEPS = 400;
 const PLACE_WITHIN_M = 0.06;
 /** The search for a way looks at every so many metres of it. */
 const GHOST_STRIDE_M = 0.12;
+/** Who glides to within so far of a place has found a way on foot. */
+const WAY_WITHIN_M = 0.35;
+/** An eye so much higher or lower than a person's hangs in the air. */
+const AFLOAT_M = 0.5;
 /** How near to a door's place a walk must come that a click on the door began. */
 const DOOR_WITHIN_M = 0.45;
 
 export class Visitor {
   readonly look = new Look();
   readonly eye = new Vector3();
-  readonly #keyboard: Keyboard;
+  readonly #wish: () => Wish;
   readonly #arrived: (door: Link) => void;
   #walker: Walker | null = null;
   #ghost: Walker | null = null;
+  #collider: Collider | null = null;
   #errand: Errand | null = null;
+  #glide: Glide | null = null;
   #door: Link | null = null;
   #steerTo: Vector3 | null = null;
   #stick: readonly [ahead: number, left: number] = [0, 0];
 
-  /** @param arrived Called when a walk to a door ends. */
-  constructor(keyboard: Keyboard, arrived: (door: Link) => void) {
-    this.#keyboard = keyboard;
+  /**
+   * @param wish What keys or sticks ask for.
+   * @param arrived Called when a walk to a door ends.
+   */
+  constructor(wish: () => Wish, arrived: (door: Link) => void) {
+    this.#wish = wish;
     this.#arrived = arrived;
   }
 
@@ -49,11 +59,26 @@ export class Visitor {
     return this.#walker?.feet ?? null;
   }
 
+  /** Where one is and what one looks at. */
+  get view(): View {
+    const target = this.look.direction().add(this.eye);
+    return {
+      position: [this.eye.x, this.eye.y, this.eye.z],
+      look_at: [target.x, target.y, target.z],
+    };
+  }
+
+  /** Whether one is on the way to somewhere. */
+  get isUnderWay(): boolean {
+    return this.#glide !== null || this.#errand !== null;
+  }
+
   /** Looks into a room that is not there yet. */
   wait(view: View): void {
     this.stop();
     this.#walker = null;
     this.#ghost = null;
+    this.#collider = null;
     this.eye.set(...view.position);
     this.look.at(this.eye, new Vector3(...view.look_at));
   }
@@ -61,10 +86,32 @@ export class Visitor {
   /** Sets foot in a room. */
   enter(view: View, collider: Collider, bounds: Bounds): void {
     this.wait(view);
+    this.#collider = collider;
     this.#walker = new Walker(collider, bounds);
-    this.#walker.place(this.eye);
     this.#ghost = new Walker(collider, bounds, GHOST_STRIDE_M);
-    this.eye.copy(this.#walker.eye);
+    this.jump(view);
+  }
+
+  /** Stands at another place of the room at once, or hangs there if that is no place to stand. */
+  jump(view: View): void {
+    this.stop();
+    this.eye.set(...view.position);
+    this.look.at(this.eye, new Vector3(...view.look_at));
+    this.#land();
+  }
+
+  /**
+   * Goes to another place of the room as a camera does, eased, on foot or through the air.
+   *
+   * @returns Whether there is a way; else one stays.
+   */
+  glide(view: View): boolean {
+    const goal = new Vector3(...view.position);
+    const path = this.#pathTo(goal);
+    if (!path) return false;
+    this.stop();
+    this.#glide = new Glide(path, this.look.direction(), new Vector3(...view.look_at));
+    return true;
   }
 
   /** Hangs the eye anywhere. */
@@ -77,6 +124,7 @@ export class Visitor {
 
   stop(): void {
     this.#errand = null;
+    this.#glide = null;
     this.#door = null;
     this.#steerTo = null;
   }
@@ -118,11 +166,12 @@ export class Visitor {
   move(dt: number): boolean {
     const walker = this.#walker;
     if (!walker) return false;
-    const wish = this.#keyboard.wish();
+    if (this.#glide) return this.#float(this.#glide, dt);
+    const wish = this.#wish();
     const ahead = wish.ahead + this.#stick[0];
     const left = wish.left + this.#stick[1];
     const asked = ahead !== 0 || left !== 0;
-    let moved = asked || this.#keyboard.active;
+    let moved = asked || wish.turn !== 0 || wish.up !== 0;
     this.look.turn(wish.turn * TURN_RAD_S * dt, wish.up * NOD_RAD_S * dt);
     if (this.#steerTo) {
       this.#steer(this.#steerTo, dt);
@@ -136,6 +185,47 @@ export class Visitor {
     if (walker.settle(dt, !prefersStillness())) moved = true;
     this.eye.copy(walker.eye);
     return moved;
+  }
+
+  /** A step through the air. */
+  #float(glide: Glide, dt: number): boolean {
+    const goesOn = glide.step(dt);
+    this.eye.copy(glide.eye);
+    this.look.at(this.eye, glide.ahead.clone().add(this.eye));
+    this.#walker?.hover(this.eye);
+    if (!goesOn) {
+      this.#glide = null;
+      this.#land();
+    }
+    return true;
+  }
+
+  /** Sets foot on the floor, where the eye is as high above one as a person's. */
+  #land(): void {
+    const walker = this.#walker;
+    if (!walker) return;
+    const asked = this.eye.z;
+    walker.place(this.eye);
+    if (Math.abs(walker.eye.z - asked) < AFLOAT_M || !walker.isGrounded) {
+      this.eye.copy(walker.eye);
+    } else {
+      walker.hover(this.eye);
+    }
+  }
+
+  /** Places of the eye on the way to a goal: along the floor, else straight; null if blocked. */
+  #pathTo(goal: Vector3): Vector3[] | null {
+    const walker = this.#walker;
+    const ghost = this.#ghost;
+    if (!walker || !ghost) return null;
+    const floor = goal.clone().setZ(goal.z - EYE_M);
+    const route = planRoute(ghost, walker.feet, floor, PLACE_WITHIN_M);
+    const last = route[route.length - 1];
+    if (last && last.distanceTo(floor) < WAY_WITHIN_M) {
+      const eyes = route.map((feet) => feet.clone().setZ(feet.z + EYE_M));
+      return [this.eye.clone(), ...eyes.slice(0, -1), goal];
+    }
+    return this.#collider?.blocks(this.eye, goal, 0) ? null : [this.eye.clone(), goal];
   }
 
   #walk(walker: Walker, ahead: number, left: number, speed: number, dt: number): void {

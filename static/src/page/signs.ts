@@ -1,8 +1,8 @@
 /** The buttons that stand for doors and notes. */
 
-import { element, icon, ICONS } from "./dom.ts";
+import { element, icon, ICONS } from "../dom.ts";
 import type { Spot } from "./hotspots.ts";
-import type { Link, Note, Triple } from "./tour.ts";
+import type { Link, Note, Triple } from "../tour.ts";
 
 const DOOR_FADE_M = [9, 18] as const;
 const NOTE_FADE_M = [4, 8] as const;

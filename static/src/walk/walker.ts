@@ -11,7 +11,7 @@
 
 import { Vector3 } from "three";
 import type { Collider } from "./collider.ts";
-import type { Triple } from "./tour.ts";
+import type { Triple } from "../tour.ts";
 
 export const EYE_M = 1.6;
 /** The highest riser that is climbed. */
@@ -57,6 +57,11 @@ export class Walker {
     this.#collider = collider;
     this.#bounds = bounds;
     this.#strideM = strideM;
+  }
+
+  /** Whether there is a floor below. */
+  get isGrounded(): boolean {
+    return this.#grounded;
   }
 
   /** Puts the eye at a point, standing on the floor that belongs to it. */

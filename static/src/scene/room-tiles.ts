@@ -3,18 +3,24 @@
 import { TilesRenderer } from "3d-tiles-renderer/three";
 import type { Tile } from "3d-tiles-renderer/core";
 import {
+  DoubleSide,
+  FrontSide,
   LoadingManager,
   Mesh,
   MeshBasicMaterial,
+  Raycaster,
   type Group,
+  type Intersection,
   type Object3D,
   type PerspectiveCamera,
   type Vector2,
 } from "three";
 import { DRACOLoader } from "three/addons/loaders/DRACOLoader.js";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
-import { Collider } from "./collider.ts";
+import { Collider } from "../walk/collider.ts";
+import { Backoff } from "./backoff.ts";
 import { boxOf, checkerboard, type Levels } from "./levels.ts";
+import { tinted } from "./tint.ts";
 
 /** Screen error in pixels above which a tile is replaced by its children. */
 const ERROR_TARGET_PX = 2;
@@ -32,8 +38,16 @@ export interface RoomEvents {
   root(collider: Collider): void;
   /** Nothing of the room can be shown. */
   failed(): void;
-  /** A tile below the root is missing; its parent stands in for it. */
+  /** A tile below the root stays missing however often it is asked for; its parent stands in. */
   partFailed(): void;
+}
+
+export interface RoomTilesOptions {
+  readonly tileset: URL;
+  readonly decoder: LoadingManager;
+  readonly camera: PerspectiveCamera;
+  readonly levels: Levels;
+  readonly phone: boolean;
 }
 
 /** What every room's tiles are decoded with; made once. */
@@ -53,16 +67,15 @@ export class RoomTiles {
   readonly #tiles: TilesRenderer;
   readonly #events: RoomEvents;
   readonly #pruned = new Map<Tile, Tile[]>();
+  readonly #failed = new Set<Tile>();
+  readonly #backoff = new Backoff(() => this.retry());
   #stale = true;
   #rootShown = false;
+  #seenThrough = false;
   #bytes = 0;
 
   constructor(
-    tileset: URL,
-    decoder: LoadingManager,
-    camera: PerspectiveCamera,
-    levels: Levels,
-    phone: boolean,
+    { tileset, decoder, camera, levels, phone }: RoomTilesOptions,
     events: RoomEvents,
   ) {
     this.#events = events;
@@ -80,6 +93,7 @@ export class RoomTiles {
     tiles.addEventListener("tile-visibility-change", () => events.changed());
     tiles.addEventListener("load-model", ({ scene, tile }) => this.#loaded(scene, tile));
     tiles.addEventListener("load-error", ({ tile }) => {
+      if (tile) this.#failed.add(tile);
       if (tile?.parent) this.#standIn(tile.parent);
       else events.failed();
       this.#touch();
@@ -118,14 +132,30 @@ export class RoomTiles {
     this.#stale = true;
   }
 
+  /** Asks again for what failed; the renderer would not, as long as it holds it for cached. */
   retry(): void {
     for (const [tile, children] of this.#pruned) tile.children = children;
     this.#pruned.clear();
     this.#tiles.resetFailedTiles();
+    for (const tile of this.#failed) this.#tiles.lruCache.remove(tile);
+    this.#failed.clear();
     this.#touch();
   }
 
+  /** Shows a room from outside: one looks through the backs of its walls. */
+  seeThrough(through: boolean): void {
+    this.#seenThrough = through;
+    this.#tiles.forEachLoadedModel((scene) => this.#setSides(scene));
+    this.#events.changed();
+  }
+
+  /** The first of the surfaces on screen that a ray from the camera meets. */
+  pick(caster: Raycaster): Intersection | null {
+    return caster.intersectObject(this.#tiles.group, true)[0] ?? null;
+  }
+
   dispose(): void {
+    this.#backoff.stop();
     this.#tiles.dispose();
   }
 
@@ -136,7 +166,7 @@ export class RoomTiles {
   #standIn(tile: Tile): void {
     if (tile.children?.length) this.#pruned.set(tile, tile.children);
     tile.children = [];
-    this.#events.partFailed();
+    if (!this.#backoff.later()) this.#events.partFailed();
   }
 
   #touch(): void {
@@ -145,16 +175,23 @@ export class RoomTiles {
   }
 
   #loaded(scene: Object3D, tile: Tile): void {
-    scene.traverse((object) => {
-      if (!(object instanceof Mesh) || !(object.material instanceof MeshBasicMaterial)) return;
-      if (object.material.map) object.material.map.anisotropy = ANISOTROPY;
-    });
+    for (const material of materialsOf(scene)) {
+      if (material.map) material.map.anisotropy = ANISOTROPY;
+      tinted(material);
+    }
+    this.#setSides(scene);
     if (tile.parent === null && !this.#rootShown) {
       this.#rootShown = true;
       this.#tiles.maxDepth = Infinity;
       this.#events.root(colliderOf(scene));
     }
     this.#touch();
+  }
+
+  #setSides(scene: Object3D): void {
+    for (const material of materialsOf(scene)) {
+      material.side = this.#seenThrough ? FrontSide : DoubleSide;
+    }
   }
 
   /** Counts what comes, and tells how much of the root tile is there. */
@@ -196,6 +233,16 @@ class ForcedLevels {
       if (coarse[siblings.indexOf(tile)]) tile.children = [];
     }
   }
+}
+
+function materialsOf(scene: Object3D): MeshBasicMaterial[] {
+  const found: MeshBasicMaterial[] = [];
+  scene.traverse((object) => {
+    if (object instanceof Mesh && object.material instanceof MeshBasicMaterial) {
+      found.push(object.material);
+    }
+  });
+  return found;
 }
 
 /** All triangles below `scene`, in the frame of the room. */

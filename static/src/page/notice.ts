@@ -1,6 +1,6 @@
 /** Messages: a line that passes, or one that stays with ways on from it. */
 
-import { element } from "./dom.ts";
+import { element } from "../dom.ts";
 
 export interface Action {
   readonly label: string;

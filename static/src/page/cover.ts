@@ -1,6 +1,6 @@
 /** What stands before the room until it can be shown: its poster, its name, how far it is. */
 
-import { element } from "./dom.ts";
+import { element } from "../dom.ts";
 
 export class Cover {
   readonly element: HTMLElement;

@@ -1,8 +1,8 @@
 /** Doors and notes: real buttons that hang over the picture where their places are. */
 
 import { Vector3, type PerspectiveCamera, type Vector2 } from "three";
-import { element } from "./dom.ts";
-import type { Triple } from "./tour.ts";
+import { element } from "../dom.ts";
+import type { Triple } from "../tour.ts";
 
 export interface Spot {
   readonly at: Triple;
@@ -22,6 +22,23 @@ export class Hotspots {
     this.#spots = spots;
     this.element.replaceChildren(...spots.map((spot) => spot.button));
     for (const spot of spots) spot.button.classList.add("away");
+  }
+
+  /** The button seen nearest to the middle of the picture, within so many pixels. */
+  nearest(within: number): HTMLButtonElement | null {
+    const frame = this.element.getBoundingClientRect();
+    let found: HTMLButtonElement | null = null;
+    let least = within;
+    for (const { button } of this.#spots) {
+      if (button.classList.contains("away")) continue;
+      const box = button.getBoundingClientRect();
+      const x = box.left + box.width / 2 - frame.left - frame.width / 2;
+      const y = box.top + box.height / 2 - frame.top - frame.height / 2;
+      if (Math.hypot(x, y) >= least) continue;
+      least = Math.hypot(x, y);
+      found = button;
+    }
+    return found;
   }
 
   /**

@@ -1,7 +1,7 @@
 /** Doors that are passed by walking up to them. */
 
 import type { Vector3 } from "three";
-import type { Triple } from "./tour.ts";
+import type { Triple } from "../tour.ts";
 
 export const PASS_M = 0.6;
 /** A door passes only someone who has been so far from it: who arrives beside one stays. */

@@ -1,0 +1,245 @@
+/** All that stands over the picture: header, dock, cover, panel, messages, doors and notes. */
+
+import { roomAddress, type Way } from "../address.ts";
+import { element, isTouch } from "../dom.ts";
+import type { Note, Room, Texts, Tour } from "../tour.ts";
+import { directionOf, textIn, wordsIn, type Words } from "../words.ts";
+import { Cover } from "./cover.ts";
+import { Dock } from "./dock.ts";
+import { Header } from "./header.ts";
+import { Hotspots, type Spot } from "./hotspots.ts";
+import { MiniMap } from "./mini-map.ts";
+import { Notice } from "./notice.ts";
+import { Panel, prose } from "./panel.ts";
+import { creditsSheet, helpSheet, noteSheet, roomsSheet, toolsSheet, type Tool } from "./sheets.ts";
+import { doorSpot, noteSpot, type SignEvents } from "./signs.ts";
+
+export interface FrontendEvents extends SignEvents {
+  /** A room was chosen from the list. */
+  chosen(room: Room): void;
+  /** A note was chosen; `lead`: from a list, so that one is brought before it. */
+  noted(room: Room, note: Note, lead: boolean): void;
+  /** The panel shows no note any more. */
+  closed(): void;
+  see(way: Way): void;
+  guide(): void;
+  search(): void;
+  /** What there is to do, beside what the frontend does itself. */
+  tools(): readonly Tool[];
+  /** Another language was chosen; everything here speaks it already. */
+  language(tag: string): void;
+}
+
+export class Frontend {
+  readonly canvas = element("canvas", { tabindex: "0", role: "application" });
+  readonly spots = new Hotspots();
+  readonly notice = new Notice();
+  readonly cover: Cover;
+  readonly map: MiniMap;
+  readonly panel: Panel;
+  /** Where modes put what they show over the picture. */
+  readonly overlay = element("div", { class: "overlay" });
+  readonly #header: Header;
+  readonly #dock: Dock;
+  readonly #told = element("p", { class: "unseen", role: "status" });
+  readonly #host: HTMLElement;
+  readonly #site: URL;
+  readonly #tour: Tour;
+  readonly #events: FrontendEvents;
+  #room: Room;
+  #language: string;
+  #words: Words;
+  #revealed = false;
+
+  constructor(
+    host: HTMLElement,
+    site: URL,
+    tour: Tour,
+    room: Room,
+    language: string,
+    events: FrontendEvents,
+  ) {
+    this.#host = host;
+    this.#site = site;
+    this.#tour = tour;
+    this.#room = room;
+    this.#events = events;
+    this.#language = language;
+    this.#words = wordsIn(language);
+    this.cover = new Cover(host.querySelector("img") ?? element("img", { alt: "" }));
+    this.panel = new Panel(() => events.closed());
+    this.map = new MiniMap(tour, () => events.see("plan"));
+    const logo = tour.logo === null ? null : new URL(tour.logo, site).href;
+    this.#header = new Header(logo, tour.languages, {
+      search: () => events.search(),
+      rooms: () => this.#listRooms(),
+      about: () => this.#tellAbout(),
+      tools: () => this.openTools(),
+      language: (tag) => this.#speak(tag),
+    });
+    this.#dock = new Dock({ guide: () => events.guide(), see: (way) => events.see(way) });
+    host.replaceChildren(
+      this.canvas,
+      this.spots.element,
+      this.cover.element,
+      this.overlay,
+      this.#header.element,
+      this.#dock.element,
+      this.map.element,
+      this.panel.element,
+      this.notice.element,
+      this.#told,
+    );
+    this.#say();
+  }
+
+  get words(): Words {
+    return this.#words;
+  }
+
+  get language(): string {
+    return this.#language;
+  }
+
+  text(texts: Texts): string {
+    return textIn(texts, this.#language);
+  }
+
+  /** The title of the view: that of the room and of the tour. */
+  get title(): string {
+    const room = this.text(this.#room.title);
+    const tour = this.text(this.#tour.title);
+    return room === tour ? tour : `${room} – ${tour}`;
+  }
+
+  /** Announces a room that is on its way. */
+  expect(room: Room, passing: boolean): void {
+    this.#room = room;
+    this.#revealed = false;
+    this.panel.close();
+    this.notice.clear();
+    this.spots.show([]);
+    this.#say();
+    const poster = new URL(room.poster, this.#site).href;
+    this.cover.show(poster, this.text(room.title), this.#words.loading, passing);
+  }
+
+  /** Shows the room's doors and notes, takes the cover away, and says where one is. */
+  reveal(): void {
+    this.cover.progress(1);
+    this.cover.hide();
+    this.#revealed = true;
+    this.showSigns();
+    this.#told.textContent = this.#words.entered.replace("{}", this.text(this.#room.title));
+  }
+
+  /** Marks the way one sees. */
+  mark(way: Way): void {
+    this.#dock.mark(way);
+    this.#host.dataset["see"] = way;
+    this.#sayHint();
+  }
+
+  hideHint(): void {
+    this.#dock.hideHint();
+  }
+
+  /** @param signs Those of the room, if left out. */
+  showSigns(signs?: readonly Spot[]): void {
+    this.spots.show(
+      signs ?? [
+        ...this.#room.links.map((link) => doorSpot(link, this.text(link.title), this.#events)),
+        ...this.#room.notes.map((note) =>
+          noteSpot(
+            note,
+            this.text(note.title),
+            () => this.#events.noted(this.#room, note, false),
+            this.#events,
+          ),
+        ),
+      ],
+    );
+  }
+
+  openNote(note: Note): void {
+    const content = noteSheet(note, this.#site, this.#language, this.#words);
+    this.panel.open(this.text(note.title), ...content);
+  }
+
+  openTools(): void {
+    const { words } = this;
+    const more: Tool[] = [
+      { name: words.help, drawing: "keys", act: () => this.panel.open(words.help, helpSheet(words)) },
+      { name: words.credits, drawing: "about", act: () => this.#tellCredits() },
+    ];
+    this.panel.open(words.tools, toolsSheet([...this.#events.tools(), ...more]));
+  }
+
+  #tellAbout(): void {
+    const text = this.text(this.#room.text);
+    if (text === "") this.#tellCredits();
+    else this.panel.open(this.text(this.#room.title), prose(text));
+  }
+
+  #tellCredits(): void {
+    const content = creditsSheet(this.#tour, this.#room, this.#language, this.#words);
+    this.panel.open(this.#words.credits, ...content);
+  }
+
+  #listRooms(): void {
+    const items = this.#tour.rooms.map((room) => {
+      const isHere = room === this.#room;
+      return {
+        title: this.text(room.title),
+        href: roomAddress(this.#site, room.id, location.search),
+        poster: new URL(room.poster, this.#site).href,
+        isHere,
+        notes: room.notes.map((note) => ({
+          title: this.text(note.title),
+          open: () => {
+            this.panel.close();
+            this.#events.noted(room, note, true);
+          },
+        })),
+        choose: () => {
+          this.panel.close();
+          if (!isHere) this.#events.chosen(room);
+        },
+      };
+    });
+    this.panel.open(this.#words.rooms, roomsSheet(items));
+  }
+
+  #speak(language: string): void {
+    this.#language = language;
+    this.#words = wordsIn(language);
+    this.panel.close();
+    this.notice.clear();
+    this.#say();
+    if (this.#revealed) this.showSigns();
+    this.#events.language(language);
+  }
+
+  #say(): void {
+    const { words } = this;
+    const root = document.documentElement;
+    root.lang = this.#language;
+    root.dir = directionOf(this.#language);
+    document.title = this.title;
+    const room = this.text(this.#room.title);
+    this.#header.say(words, this.#language, this.text(this.#tour.title), room);
+    this.#dock.say(words);
+    this.map.say(words);
+    this.panel.setWords(words.close);
+    this.canvas.setAttribute("aria-label", words.view);
+    this.spots.element.setAttribute("aria-label", words.doors);
+    this.#sayHint();
+  }
+
+  #sayHint(): void {
+    const { words } = this;
+    const outside = this.#host.dataset["see"] === "orbit" || this.#host.dataset["see"] === "dollhouse";
+    const onFoot = isTouch() ? words.hintTouch : words.hintMouse;
+    this.#dock.hint(outside ? words.hintOutside : onFoot);
+  }
+}
