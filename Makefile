@@ -17,7 +17,7 @@ help:
 	@echo "make bench-fidelity   every method and its peers against it (BENCH='--room chamber1')"
 	@echo "make bench-speed      time and memory beside what one does by hand (BENCH='--points 1300000')"
 	@echo "make bench-rooms      how many rooms use two cores"
-	@echo "make soak        a build killed at 30 moments, which takes half an hour"
+	@echo "make soak        a build killed at 30 moments, half an hour of wandering: an hour"
 	@echo "make pictures    screenshots of the demo for README and docs"
 	@echo "make lock        pin the newest versions, with their hashes"
 	@echo "make clean       drop all that make made"
@@ -107,6 +107,7 @@ lint: install
 .PHONY: soak
 soak: install system-tests tests/node_modules/.package-lock.json
 	$(BIN)/pytest tests/commands/test_kills.py --kills 30
+	$(BIN)/pytest tests/browser/test_wander.py --wander 1800
 
 .PHONY: bench
 bench: demo
@@ -151,4 +152,4 @@ lock: $(VENV)/.packages
 .PHONY: clean
 clean:
 	rm -rf $(VENV) static/dist static/node_modules tests/node_modules dist build \
-		sites/*/scans sites/*/truth sites/*/site sites/*/.tourgen
+		sites/*/scans sites/*/sounds sites/*/truth sites/*/site sites/*/.tourgen

@@ -1,7 +1,8 @@
-"""Screenshots of every room of a published tour, for README and docs.
+"""Screenshots of every room of a published tour and of every way to see, for README and docs.
 
 ``python docs/pictures.py SITE [FOLDER]`` opens each room as one who comes through a door, in a
-window of a desktop and of a phone, and writes ``ROOM-desktop.webp`` and ``ROOM-phone.webp``.
+window of a desktop and of a phone, and writes ``ROOM-desktop.webp`` and ``ROOM-phone.webp``; and
+``visit-MODE-desktop.webp`` and so on of the room that the tour starts in.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import argparse
 import io
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Thread
@@ -59,6 +60,10 @@ def main() -> None:
                 file = asked.folder / f"{room}-{window.name}.webp"
                 picture.save(file, quality=QUALITY, method=6)
                 print(f"{file}: {file.stat().st_size / 1000:.0f} kB", flush=True)
+            for mode, picture in modes(chromium, server.address.rstrip("/"), window):
+                picture.save(
+                    asked.folder / f"visit-{mode}-{window.name}.webp", quality=QUALITY, method=6
+                )
         chromium.close()
         server.shutdown()
 
@@ -78,6 +83,62 @@ def pictures(
         visitor.open(f"rooms/{room['id']}/index.html")
         visitor.teleport(**_view(tour, room))
         yield room["id"], _shot(visitor.page)
+        context.close()
+        if visitor.faults:
+            sys.exit("\n".join(visitor.faults))
+
+
+def _tool(page: Page, name: str) -> None:
+    page.locator(".tools button").nth(3).click()
+    page.locator(".tool-item", has_text=name).click()
+
+
+def _measured(page: Page) -> None:
+    _tool(page, "Measure")
+    page.locator(".tool-bar").wait_for()
+    size = page.viewport_size or {"width": 0, "height": 0}
+    for x, y in ((0.35, 0.5), (0.65, 0.55)):
+        page.mouse.click(x * size["width"], y * size["height"])
+
+
+MODES: dict[str, Callable[[Page], object]] = {
+    "walk": lambda _: None,
+    "orbit": lambda page: page.locator(".way").nth(1).click(),
+    "dollhouse": lambda page: page.locator(".way").nth(2).click(),
+    "plan": lambda page: page.locator(".way").nth(3).click(),
+    "guide": lambda page: page.locator(".guide-start").click(),
+    "search": lambda page: page.locator(".tools button").nth(0).click(),
+    "rooms": lambda page: page.locator(".tools button").nth(2).click(),
+    "tools": lambda page: page.locator(".tools button").nth(3).click(),
+    "note": lambda page: page.goto(page.url.split("#")[0] + "#note=1"),
+    "measure": _measured,
+    "section": lambda page: _tool(page, "Cut open"),
+    "tint": lambda page: _tool(page, "What was scanned"),
+    "share": lambda page: _tool(page, "Share this view"),
+    "credits": lambda page: _tool(page, "About this tour"),
+}
+"""What is done to see in a way, in the tour's first room."""
+
+
+def modes(chromium: Browser, origin: str, window: Window) -> Iterator[tuple[str, Image.Image]]:
+    """Each way to see and tool, and its picture."""
+    for mode, act in MODES.items():
+        context = chromium.new_context(
+            viewport={"width": window.width, "height": window.height},
+            is_mobile=window.touch,
+            has_touch=window.touch,
+            reduced_motion="reduce",
+            color_scheme="light",
+            locale="en",
+        )
+        visitor = Visitor(context.new_page(), origin)
+        visitor.open("index.html")
+        visitor.settle()
+        act(visitor.page)
+        visitor.page.wait_for_timeout(1500)
+        if mode != "guide":  # it goes on
+            visitor.settle()
+        yield mode, _shot(visitor.page)
         context.close()
         if visitor.faults:
             sys.exit("\n".join(visitor.faults))

@@ -16,6 +16,9 @@ from tourgen.cli import main
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--wander", type=float, default=20, help="seconds of wandering about (make soak: 1800)"
+    )
     parser.addoption("--tour", type=Path, help="judge this built tour, not a miniature of the demo")
     parser.addoption("--kills", type=int, default=2, help="builds that are killed (make soak: 30)")
 

@@ -7,7 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
-from tourgen.simulate import MODELS, Size, simulate_room
+from tourgen.simulate import MODELS, Size, simulate_room, write_sea
 
 DEMO = Path(__file__).parents[1] / "sites/lighthouse"
 SIZE = Size(points=250_000, texture=1024, e57=False)
@@ -16,7 +16,9 @@ COARSE = "[room.surface]\ndetail_mm = 20\n[room.texture]\ntexel_mm = 12\n\n"
 
 def write_miniature(folder: Path) -> None:
     """Write tour.toml, texts, scans and ground truth."""
-    shutil.copytree(DEMO / "texts", folder / "texts")
+    for name in ("texts", "images"):
+        shutil.copytree(DEMO / name, folder / name)
+    write_sea(folder)
     head, *rooms = (DEMO / "tour.toml").read_text(encoding="utf-8").split("[[room]]")
     coarse = (room.replace("[[room.link]]", f"{COARSE}[[room.link]]", 1) for room in rooms)
     (folder / "tour.toml").write_text("[[room]]".join([head, *coarse]), encoding="utf-8")

@@ -231,7 +231,7 @@ def test_click_on_the_floor_goes_there(site: Path, visit: Visit) -> None:
     here.open("rooms/chamber1/index.html")
     here.teleport(**arrival(site, "chamber1"))
     start = here.position
-    here.page.mouse.click(MIDDLE[0], SIZE[1] - 60)
+    here.page.mouse.click(MIDDLE[0], SIZE[1] - 76)
     for _ in within(here, "walking to the clicked place"):
         if np.linalg.norm(here.position - start) > 0.3:
             break

@@ -245,8 +245,9 @@ def test_faults_of_the_tour_file_do_not_hide_those_of_the_scans(folder):
     with pytest.raises(Faults) as caught:
         check_tour(folder)
     assert [fault.message for fault in caught.value.faults] == [
-        "tour.toml: room `kitchen`: unti: unknown key, expected one of clean, closed, id, keep, "
-        "link, mesh, note, remove, scans, start, stations, surface, text, texture, title, unit, up",
+        "tour.toml: room `kitchen`: unti: unknown key, expected one of captured, clean, closed, "
+        "id, keep, link, mesh, note, place, remove, scans, start, stations, surface, text, "
+        "texture, title, unit, up",
         "tour.toml: room `hall`: link 1: to: room `atelier` does not exist",
         "room `kitchen`: scan `few.ply`: expected at least 10000 points, found 50",
     ]

@@ -1,7 +1,7 @@
 /** Rooms to walk in, made of boxes and steps. */
 
-import { Collider } from "../../static/src/collider.ts";
-import type { Bounds } from "../../static/src/walker.ts";
+import { Collider } from "../../static/src/walk/collider.ts";
+import type { Bounds } from "../../static/src/walk/walker.ts";
 
 type Point = readonly [number, number, number];
 

@@ -1,13 +1,13 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { roomAddress, roomAt } from "../../static/src/address.ts";
-import { Errand } from "../../static/src/errand.ts";
-import { checkerboard } from "../../static/src/levels.ts";
-import { Look, PITCH_MAX, wrap } from "../../static/src/look.ts";
-import { planRoute } from "../../static/src/route.ts";
-import { Sharpness } from "../../static/src/sharpness.ts";
-import { ARM_M, PASS_M, Thresholds } from "../../static/src/threshold.ts";
-import { EYE_M, Walker } from "../../static/src/walker.ts";
+import { Errand } from "../../static/src/walk/errand.ts";
+import { checkerboard } from "../../static/src/scene/levels.ts";
+import { Look, PITCH_MAX, wrap } from "../../static/src/walk/look.ts";
+import { planRoute } from "../../static/src/walk/route.ts";
+import { Sharpness } from "../../static/src/scene/sharpness.ts";
+import { ARM_M, PASS_M, Thresholds } from "../../static/src/walk/threshold.ts";
+import { EYE_M, Walker } from "../../static/src/walk/walker.ts";
 import { chooseLanguage, textIn, wordsIn } from "../../static/src/words.ts";
 import { room, SIX_METRES, spiral } from "./rooms.ts";
 

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Collider } from "../../static/src/collider.ts";
-import { EYE_M, Walker } from "../../static/src/walker.ts";
+import { Collider } from "../../static/src/walk/collider.ts";
+import { EYE_M, Walker } from "../../static/src/walk/walker.ts";
 import { room, Shape, SIX_METRES, spiral } from "./rooms.ts";
 
 const STEP_S = 1 / 60;
