@@ -29,9 +29,18 @@ _TYPES: Final = {
     ".html": "text/html; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
     ".json": "application/json",
+    ".m4a": "audio/mp4",
+    ".mp3": "audio/mpeg",
+    ".ogg": "audio/ogg",
+    ".otf": "font/otf",
     ".svg": "image/svg+xml",
+    ".ttf": "font/ttf",
+    ".vtt": "text/vtt; charset=utf-8",
     ".wasm": "application/wasm",
+    ".wav": "audio/wav",
     ".webp": "image/webp",
+    ".woff": "font/woff",
+    ".woff2": "font/woff2",
 }
 _RANGE: Final = re.compile(r"bytes=(\d*)-(\d*)")
 
@@ -150,6 +159,21 @@ class _Handler(http.server.SimpleHTTPRequestHandler):
         super().send_response(code, message)
         if code in (HTTPStatus.OK, HTTPStatus.PARTIAL_CONTENT):
             self.send_header("Accept-Ranges", "bytes")
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """For a page that is not there, the tour's own page about it, as other hosts do."""
+        page = Path(self.directory) / "404.html"
+        asks_page = Path(self.path.partition("?")[0]).suffix in ("", ".html")
+        if code != HTTPStatus.NOT_FOUND or not asks_page or not page.is_file():
+            super().send_error(code, message, explain)
+            return
+        content = page.read_bytes()
+        self.send_response(code)
+        self.send_header("Content-Type", self.guess_type(page))
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(content)
 
     def copyfile(self, source: SupportsRead[bytes], outputfile: SupportsWrite[bytes]) -> None:  # type: ignore[override]
         """A visitor who leaves while a tile is on its way is no fault."""

@@ -25,6 +25,8 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "r.glb").write_bytes(TILE)
     for name in ("viewer/viewer-1.js", "viewer/d.wasm", "p.webp", "viewer/style-1.css", "i.svg"):
         (tmp_path / name).write_bytes(b"x")
+    for name in ("sea.m4a", "sea.ogg", "sea.vtt", "text.woff2"):
+        (tmp_path / name).write_bytes(b"x")
     (tmp_path.parent / "secret").write_text("not yours")
     return tmp_path
 
@@ -58,6 +60,10 @@ def ask(
         ("/r.glb", "model/gltf-binary"),
         ("/p.webp", "image/webp"),
         ("/i.svg", "image/svg+xml"),
+        ("/sea.m4a", "audio/mp4"),
+        ("/sea.ogg", "audio/ogg"),
+        ("/sea.vtt", "text/vtt; charset=utf-8"),
+        ("/text.woff2", "font/woff2"),
         ("/viewer/viewer-1.js", "text/javascript; charset=utf-8"),
         ("/viewer/style-1.css", "text/css; charset=utf-8"),
         ("/viewer/d.wasm", "application/wasm"),
@@ -125,6 +131,20 @@ def test_only_what_is_named_by_its_content_is_kept_for_ever(server: TourServer) 
         server, "/r.glb", **{"If-Modified-Since": asked_again.headers["Last-Modified"]}
     )
     assert (unchanged.status, body) == (304, b"")
+
+
+def test_a_page_that_is_not_there_is_told_by_the_tours_own(
+    server: TourServer, folder: Path
+) -> None:
+    (folder / "404.html").write_text("<!doctype html>elsewhere")
+    for path in ("/rooms/attic/index.html", "/rooms/attic/", "/attic?lang=fr"):
+        answer, body = ask(server, path)
+        assert answer.status == 404
+        assert answer.headers["Content-Type"] == "text/html; charset=utf-8"
+        assert body == b"<!doctype html>elsewhere"
+    answer, body = ask(server, "/rooms/attic/tiles/r.glb")
+    assert answer.status == 404
+    assert b"elsewhere" not in body
 
 
 @pytest.mark.parametrize("path", ["/../secret", "/%2e%2e/secret", "/viewer/../../secret"])

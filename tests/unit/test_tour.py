@@ -285,6 +285,20 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(folder):
             "",
         ),
         ("[[room.note]]\ntitle = 'N'", "note 1: at: expected this key, found none", ""),
+        (
+            "[[room.note]]\nat = [0, 0, 1]\ntitle = 'N'\nsound = 'scans/a.ply'",
+            "note 1: sound: expected a file that ends in .mp3, .m4a, .ogg, .wav, found",
+            "",
+        ),
+        (
+            "[[room.note]]\nat = [0, 0, 1]\ntitle = 'N'\ncaptions = 'scans/a.ply'",
+            "note 1: captions: expected a `sound` that they belong to, found none",
+            "",
+        ),
+        ("captured = '2026-05-12'", "captured: expected a date such as 2026-05-12", "quotes"),
+        ("captured = 10:30:00", "captured: expected a date such as 2026-05-12", ""),
+        ("place = { turn_deg = 90 }", "place.at: expected this key, found none", ""),
+        ("place = { at = [0, 0, 0], turn_deg = 999 }", "turn_deg: expected -360 to 360", ""),
         ("[room.link]\nto = 'x'", "link: expected a list, found a table", "[[link]]"),
     ],
 )
@@ -293,6 +307,32 @@ def test_a_wrong_value_is_told_with_its_key(folder, lines, said, hint):
     assert message.startswith("room `kitchen`: ")
     assert said in message
     assert hint in found_hint
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ('address = "example.org"', "tour.address: expected an address of a folder"),
+        ('address = "https://a.org/?x=1"', "tour.address: expected an address of a folder"),
+        ("north_deg = 400", "tour.north_deg: expected -360 to 360, found 400"),
+        ('credits = "nobody.md"', "tour.credits: expected a file, found none at `nobody.md`"),
+    ],
+)
+def test_what_is_wrong_with_the_tour_as_a_whole_is_told(folder, lines, said):
+    with pytest.raises(Faults) as caught:
+        load(folder, TWO_ROOMS.replace("[tour]", f"[tour]\n{lines}", 1))
+    assert said in caught.value.faults[0].message
+
+
+def test_a_stop_must_be_in_a_room_of_the_tour(folder):
+    stop = '[[stop]]\nroom = "kitchn"\nposition = [0, 0, 1.6]\nlook_at = [1, 0, 1.6]\n'
+    with pytest.raises(Faults) as caught:
+        load(folder, TWO_ROOMS + stop)
+    (fault,) = caught.value.faults
+    assert "stop 1: room: room `kitchn` does not exist" in fault.message
+    assert fault.hint == "did you mean `kitchen`?"
+    tour = load(folder, TWO_ROOMS + stop.replace("kitchn", "kitchen"))
+    assert tour.stops[0].look_at == (1, 0, 1.6)
 
 
 @pytest.mark.parametrize(

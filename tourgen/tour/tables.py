@@ -44,10 +44,13 @@ from tourgen.tour.values import (
     Whole,
     fault,
     near,
+    shown,
 )
 
 TOUR_FILE: Final = "tour.toml"
 UNITS: Final[Mapping[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
+SOUNDS: Final = (".mp3", ".m4a", ".ogg", ".wav")
+"""What browsers play."""
 
 
 class _Table(BaseModel):
@@ -294,6 +297,13 @@ class Note(_Table):
         default={},
         description="What the sound says, WebVTT files; `{lang}` stands for the language.",
     )
+
+    @field_validator("sound")
+    @classmethod
+    def _is_played(cls, value: str | None) -> str | None:
+        if value is not None and Path(value).suffix.lower() not in SOUNDS:
+            raise fault(f"expected a file that ends in {', '.join(SOUNDS)}, found {shown(value)}")
+        return value
 
     @field_validator("captions")
     @classmethod
