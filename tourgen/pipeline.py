@@ -340,7 +340,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         baked,
         settings=poster.Settings(),
         version=poster.VERSION,
-        libraries=("open3d", "pillow"),
+        libraries=("numba", "open3d", "pillow"),
     )
     drawn = task(
         "plan",

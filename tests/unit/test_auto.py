@@ -16,7 +16,6 @@ from tourgen.stages.surface import auto, poisson, signed_distance
 SPACING_M = 0.02
 SETTINGS = auto.Settings(
     signed_distance.Settings(SPACING_M, SPACING_M),
-    poisson.Settings(2 * SPACING_M),
     poisson.Settings(SPACING_M),
 )
 

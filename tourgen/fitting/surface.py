@@ -18,12 +18,11 @@ from tourgen.stages.mesh_arrays import vertex_normals
 from tourgen.stages.sift import Sifted
 from tourgen.stages.spacing import Spacing
 from tourgen.stages.surface import auto, ball_pivoting, crust, poisson, signed_distance
+from tourgen.threads import threads
 from tourgen.tour import Room
 from tourgen.tour import Surface as Asked
 
 VERSION = sum(method.VERSION for method in (auto, ball_pivoting, crust, poisson, signed_distance))
-_COARSER = 2.0
-"""Cells of the solve across gaps over the detail."""
 _NEAR_M = 0.2
 _SAMPLE = 10_000
 
@@ -91,7 +90,6 @@ def _by_auto(o: OrientedCloud, spacing: Spacing, asked: Asked, detail: float) ->
         o,
         auto.Settings(
             _distance(spacing, asked, detail),
-            poisson.Settings(_COARSER * detail),
             poisson.Settings(detail),
         ),
     )
@@ -101,7 +99,7 @@ def _by_auto(o: OrientedCloud, spacing: Spacing, asked: Asked, detail: float) ->
     return Drawn(
         chosen.mesh,
         f"signed-distance on {chosen.dense_share:.1%} of the area, where the scan is dense "
-        f"({apart}); poisson on the rest, across its gaps",
+        f"({apart}); the winding number on the rest, across its gaps",
     )
 
 
@@ -199,7 +197,7 @@ def mended(room: Room, folder: Path, kept: Sifted, asked: Mended) -> Drawn:
     frame, cloud = Frame.of(room.unit_m, room.up), kept.cloud
     mesh = read_mesh(local(folder, asked.file), asked.file, frame, cloud.origin)
     sample = cloud.points[:: max(1, len(cloud) // _SAMPLE)]
-    away, _ = cKDTree(mesh.vertices[mesh.faces].mean(axis=1)).query(sample, workers=-1)
+    away, _ = cKDTree(mesh.vertices[mesh.faces].mean(axis=1)).query(sample, workers=threads())
     off_m = float(np.median(away))
     if off_m > max(_NEAR_M, 0.1 * float(np.ptp(sample, axis=0).max())):
         raise InputError(

@@ -20,7 +20,7 @@ from scipy.sparse import csr_array, eye_array
 from scipy.sparse.linalg import splu
 
 from tourgen.geometry import Float32, Float64, Int32, Mesh
-from tourgen.rays import ray_scene, rays_of
+from tourgen.rays import along, ray_scene, rays_of
 from tourgen.stages.free_space import FreeSpace
 from tourgen.stages.mesh_arrays import edges, vertex_areas, vertex_normals
 
@@ -114,7 +114,8 @@ def _way_back(mesh: Mesh, at: Int64, free: FreeSpace, apart_m: float) -> Float64
     """
     start, way = mesh.vertices[at], -vertex_normals(mesh)[at]
     rays = rays_of(start + _STEP_M / 4 * way, way)
-    scene = ray_scene(mesh.vertices, mesh.faces)
+    near = along(mesh, start, way, _FARTHEST_M + apart_m)
+    scene = ray_scene(near.vertices, near.faces)
     through_m = scene.cast_rays(rays)["t_hit"].numpy() + _STEP_M / 4
     back_m = np.full(len(at), np.nan)
     going = np.arange(len(at))

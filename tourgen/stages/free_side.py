@@ -37,6 +37,7 @@ from tourgen.geometry import Float32, Float64
 from tourgen.neighbours import Neighbours
 from tourgen.rays import ray_scene, rays_of
 from tourgen.stages.tangent import across
+from tourgen.threads import threads
 from tourgen.voxels import voxel_groups
 
 _PATCHES = 90_000
@@ -142,7 +143,7 @@ def _splats(place: Float32, normal: Float32, half_m: float) -> Any:
 
 def _smoothness(place: Float32, normal: Float32) -> _Edges:
     count = min(_NEIGHBOURS + 1, len(place))
-    near = np.asarray(cKDTree(place).query(place, k=np.arange(2, count + 1), workers=-1)[1])
+    near = np.asarray(cKDTree(place).query(place, k=np.arange(2, count + 1), workers=threads())[1])
     first, second = np.repeat(np.arange(len(place)), near.shape[1]), near.reshape(-1)
     alike = _likeness(place[first], normal[first], place[second], normal[second])
     return _Edges(first, second, (_SMOOTH * alike * np.abs(alike)).astype(np.float64))

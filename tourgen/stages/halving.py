@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from tourgen.extent import extent
 from tourgen.geometry import Float32, Mesh
 
 Ints = npt.NDArray[np.int64]
@@ -15,7 +16,8 @@ def halved(mesh: Mesh, count: int) -> Ints:
 
     Parts that are near are near in number.
     """
-    centre: Float32 = mesh.vertices[mesh.faces].mean(axis=1)
+    a, b, c = (mesh.vertices[corner] for corner in mesh.faces.T)
+    centre: Float32 = (a + b + c) / np.float32(3)
     label = np.empty(len(centre), np.int64)
 
     def bisect(faces: Ints, first: int, last: int) -> None:
@@ -23,8 +25,8 @@ def halved(mesh: Mesh, count: int) -> Ints:
             label[faces] = first
             return
         middle = (first + last) // 2
-        at = centre[faces]
-        order = np.argsort(at[:, np.argmax(np.ptp(at, axis=0))], kind="stable")
+        low, high = extent(centre[faces])
+        order = np.argsort(centre[faces, np.argmax(high - low)], kind="stable")
         cut = len(faces) * (middle - first) // (last - first)
         bisect(faces[order[:cut]], first, middle)
         bisect(faces[order[cut:]], middle, last)

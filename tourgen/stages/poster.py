@@ -11,7 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
+from tourgen.compiled import compiled
 from tourgen.errors import StageError
 from tourgen.geometry import Float32, TexturedMesh, UInt8, View
 from tourgen.rays import rays_of
@@ -90,12 +92,12 @@ def around(tiles: Sequence[TexturedMesh], view: View, settings: Settings) -> UIn
     elevation = np.pi / 2 - (np.arange(height) + 0.5) * (np.pi / height)
     eye = view.position.astype(np.float32)
     picture = np.empty((height, width, 3), np.float32)
-    for row, up in enumerate(elevation):
-        level = np.cos(up)
-        ways = np.stack(
-            [level * np.cos(azimuth), level * np.sin(azimuth), np.full(width, np.sin(up))], axis=1
-        )
-        picture[row] = scene.look(eye, ways.astype(np.float32), settings.void)
+    for row in range(0, height, _ROWS_AT_ONCE):
+        rows = slice(row, row + _ROWS_AT_ONCE)
+        up, turn = np.meshgrid(elevation[rows], azimuth, indexing="ij")
+        ways = np.stack([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)], -1)
+        colors = scene.look(eye, ways.astype(np.float32).reshape(-1, 3), settings.void)
+        picture[rows] = colors.reshape(-1, width, 3)
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 
@@ -124,41 +126,53 @@ class _Scene:
         if not tiles:
             raise StageError("poster: expected at least 1 tile, found 0")
         self._scene = o3d.t.geometry.RaycastingScene()
-        self._tiles: dict[int, TexturedMesh] = {}
+        self._tiles: dict[int, tuple[Float32, UInt8]] = {}
         for tile in tiles:
             mesh = tile.uv_mesh.mesh
             key = self._scene.add_triangles(
                 o3d.core.Tensor(np.ascontiguousarray(mesh.vertices)),
                 o3d.core.Tensor(mesh.faces.astype(np.uint32)),
             )
-            self._tiles[int(key)] = tile
+            self._tiles[int(key)] = tile.uv_mesh.uv[mesh.faces], tile.texture
 
     def look(self, eye: Float32, directions: Float32, void: tuple[int, int, int]) -> Float32:
         """(n, 3) what each ray sees; ``void`` where it meets nothing."""
         colors = np.tile(np.array(void, np.float32), (len(directions), 1))
         answer = self._scene.cast_rays(rays_of(eye, directions))
         hit = {name: value.numpy() for name, value in answer.items()}
-        geometry = hit["geometry_ids"]
-        met = np.isfinite(hit["t_hit"])
-        for key in np.unique(geometry[met]):
-            which = np.flatnonzero(met & (geometry == key))
-            tile = self._tiles[int(key)]
-            corner = tile.uv_mesh.uv[tile.uv_mesh.mesh.faces[hit["primitive_ids"][which]]]
-            u, v = hit["primitive_uvs"][which].T[..., None]
-            uv = corner[:, 0] * (1 - u - v) + corner[:, 1] * u + corner[:, 2] * v
-            colors[which] = _bilinear(tile.texture, uv)
+        order = np.argsort(hit["geometry_ids"], kind="stable")
+        keys, first = np.unique(hit["geometry_ids"][order], return_index=True)
+        for key, which in zip(keys, np.split(order, first[1:]), strict=True):
+            tile = self._tiles.get(int(key))
+            if tile is not None:  # else there is nothing
+                face, at = hit["primitive_ids"][which], hit["primitive_uvs"][which]
+                _paint(which, face, at, *tile, colors)
         return colors
 
 
-def _bilinear(texture: UInt8, uv: Float32) -> Float32:
-    """(n, 3) the picture at texture coordinates."""
+@compiled
+def _paint(
+    which: npt.NDArray[np.int64],
+    face: npt.NDArray[np.uint32],
+    at: Float32,
+    uv: Float32,
+    texture: UInt8,
+    colors: Float32,
+) -> None:
+    """Write the colours of some rays, where each met a face; bilinear."""
     height, width = texture.shape[:2]
-    at = uv * (width, height) - 0.5
-    low = np.floor(at).astype(np.int64)
-    part = (at - low).astype(np.float32)
-    x = np.clip(np.stack([low[:, 0], low[:, 0] + 1]), 0, width - 1)
-    y = np.clip(np.stack([low[:, 1], low[:, 1] + 1]), 0, height - 1)
-    across, down = part[:, :1], part[:, 1:]
-    above = texture[y[0], x[0]] * (1 - across) + texture[y[0], x[1]] * across
-    below = texture[y[1], x[0]] * (1 - across) + texture[y[1], x[1]] * across
-    return np.asarray(above * (1 - down) + below * down, np.float32)
+    for k, ray in enumerate(which):
+        a, b, c = uv[face[k]]
+        u, v = at[k]
+        x = (a[0] + u * (b[0] - a[0]) + v * (c[0] - a[0])) * width - np.float32(0.5)
+        y = (a[1] + u * (b[1] - a[1]) + v * (c[1] - a[1])) * height - np.float32(0.5)
+        left, top = int(np.floor(x)), int(np.floor(y))
+        right_part, low_part = x - left, y - top
+        right, low = min(max(left + 1, 0), width - 1), min(max(top + 1, 0), height - 1)
+        left, top = min(max(left, 0), width - 1), min(max(top, 0), height - 1)
+        for channel in range(3):
+            above = texture[top, left, channel] * (1 - right_part)
+            above += texture[top, right, channel] * right_part
+            below = texture[low, left, channel] * (1 - right_part)
+            below += texture[low, right, channel] * right_part
+            colors[ray, channel] = above * (1 - low_part) + below * low_part

@@ -33,15 +33,17 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from tourgen.compiled import compiled
 from tourgen.errors import InputError
-from tourgen.geometry import Float32, Float64, PointCloud
+from tourgen.geometry import Float32, Float64, Int32, PointCloud
 from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import components
 from tourgen.stages.tangent import tangent_planes
 from tourgen.stages.thin import Settings as Voxel
 from tourgen.stages.thin import thin
+from tourgen.threads import in_parts
 
-VERSION = 3
+VERSION = 4
 _NEIGHBOURS = (12, 32)
 _SAMPLES = 25_000
 _ROUNDS_A_REACH = 40
@@ -54,6 +56,7 @@ _PROBE_M = 2.0
 _HOLDING_ROUNDS = 20
 _SHADES = 12
 """Neighbours that a gradient of brightness is fitted to."""
+_PART = 1 << 14
 _LEAST_SHADE = 0.01
 
 
@@ -240,14 +243,55 @@ def _view(cloud: PointCloud, stations: Float64, number: int, settings: Settings)
 def _slope(around: Neighbours, points: Float32, normal: Float32, light: Float32) -> Float64:
     """Gradient of the brightness in the tangent plane of each point, by least squares."""
     near = around.nearest(points, min(_SHADES, len(points)))[0]
-    way = points[near] - points[:, None]
-    way -= np.einsum("mkj,mj->mk", way, normal)[..., None] * normal[:, None]
-    change = light[near] - light[:, None]
-    square = np.einsum("mki,mkj->mij", way, way).astype(np.float64)
-    # the normal's own direction gets the spread of the others: no change along it, no singularity
-    spread = np.trace(square, axis1=1, axis2=2)[:, None, None] + 1e-9
-    square += spread * normal[:, :, None] * normal[:, None, :] + 1e-3 * spread * np.eye(3)
-    return np.linalg.solve(square, np.einsum("mkj,mk->mj", way, change)[..., None])[..., 0]
+    slope = np.empty((len(points), 3))
+
+    def fit(first: int, last: int) -> None:
+        _fit_slopes(near[first:last], first, points, normal, light, slope)
+
+    in_parts(fit, len(points), _PART)
+    return slope
+
+
+@compiled
+def _fit_slopes(
+    near: Int32, first: int, points: Float32, normal: Float32, light: Float32, slope: Float64
+) -> None:
+    """Write the gradients at some points, from the first on."""
+    for row in range(len(near)):
+        i = first + row
+        nx, ny, nz = np.float64(normal[i, 0]), np.float64(normal[i, 1]), np.float64(normal[i, 2])
+        xx = xy = xz = yy = yz = zz = x_light = y_light = z_light = 0.0
+        for j in near[row]:
+            x, y, z = (
+                points[j, 0] - points[i, 0],
+                points[j, 1] - points[i, 1],
+                points[j, 2] - points[i, 2],
+            )
+            height = x * nx + y * ny + z * nz
+            x, y, z = x - height * nx, y - height * ny, z - height * nz
+            change = light[j] - light[i]
+            xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
+            yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
+            x_light, y_light, z_light = (
+                x_light + x * change,
+                y_light + y * change,
+                z_light + z * change,
+            )
+        # The normal's own direction gets the spread of the others: no change along it, and
+        # something to divide by.
+        spread = xx + yy + zz + 1e-9
+        xx, yy, zz = (
+            xx + spread * (nx * nx + 1e-3),
+            yy + spread * (ny * ny + 1e-3),
+            zz + spread * (nz * nz + 1e-3),
+        )
+        xy, xz, yz = xy + spread * nx * ny, xz + spread * nx * nz, yz + spread * ny * nz
+        a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+        d, e, f = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+        size = xx * a + xy * b + xz * c
+        slope[i, 0] = (a * x_light + b * y_light + c * z_light) / size
+        slope[i, 1] = (b * x_light + d * y_light + e * z_light) / size
+        slope[i, 2] = (c * x_light + e * y_light + f * z_light) / size
 
 
 def _aligned(

@@ -150,10 +150,11 @@ class Surface(_Table):
 
     method: Literal["auto", "poisson", "ball-pivoting", "signed-distance", "crust"] = Field(
         default="auto",
-        description="The method. `auto`: signed distance where the scan is dense, Poisson across "
-        "its gaps. `poisson`: closes every gap, rounds edges. `ball-pivoting`: a mesh of the "
-        "points themselves, open where they end. `signed-distance`: flat walls and sharp edges, "
-        "open where the points end; the fastest, for a preview. `crust`: for small clean clouds.",
+        description="The method. `auto`: signed distance where the scan is dense, the "
+        "winding number across its gaps. `poisson`: closes every gap, rounds edges. "
+        "`ball-pivoting`: a mesh of the points themselves, open where they end. "
+        "`signed-distance`: flat walls and sharp edges, open where the points end; the fastest, "
+        "for a preview. `crust`: for small clean clouds.",
     )
     detail_mm: Number | None = Field(
         default=None,

@@ -19,6 +19,7 @@ from tourgen.stages.mesh_arrays import components
 from tourgen.stages.sift.nearby import nearby
 from tourgen.stages.sift.strays import clusters
 from tourgen.stages.sift.views import View
+from tourgen.threads import threads
 
 Mask = npt.NDArray[np.bool_]
 _ROUNDS = 4
@@ -70,7 +71,7 @@ def _grown(cloud: PointCloud, gone: Mask) -> Mask:
             break
         rest = np.flatnonzero(~gone)
         distance, _ = cKDTree(cloud.points[gone]).query(
-            cloud.points[rest], distance_upper_bound=_GROW_M, workers=-1
+            cloud.points[rest], distance_upper_bound=_GROW_M, workers=threads()
         )
         edge = rest[np.isfinite(distance)]
         edge = edge[~_confirmed(cloud, edge, ~gone, _SAME_PLACE_M)]
@@ -93,7 +94,7 @@ def _enclaves(cloud: PointCloud, gone: Mask) -> npt.NDArray[np.int64]:
         return np.empty(0, np.int64)
     rest = np.flatnonzero(~gone)
     distance, _ = cKDTree(body).query(
-        cloud.points[rest], distance_upper_bound=_ENCLAVE_M + _GROW_M, workers=-1
+        cloud.points[rest], distance_upper_bound=_ENCLAVE_M + _GROW_M, workers=threads()
     )
     near = np.isfinite(distance)
     rest, distance = rest[near], np.asarray(distance)[near]
@@ -116,7 +117,7 @@ def _amid(cloud: PointCloud, edge: npt.NDArray[np.int64], gone: Mask) -> Mask:
     if not len(edge):
         return np.zeros(0, np.bool_)
     tree = cKDTree(cloud.points[edge])
-    distance, _ = tree.query(cloud.points, distance_upper_bound=2 * _GROW_M, workers=-1)
+    distance, _ = tree.query(cloud.points, distance_upper_bound=2 * _GROW_M, workers=threads())
     around = np.flatnonzero(np.isfinite(distance))
     far = 2 * _GROW_M
     distance, near = cKDTree(cloud.points[around]).query(
@@ -138,14 +139,14 @@ def _confirmed(cloud: PointCloud, at: npt.NDArray[np.int64], by: Mask, radius_m:
         return found
     witness = np.flatnonzero(by)
     distance, _ = cKDTree(cloud.points[at]).query(
-        cloud.points[witness], distance_upper_bound=2 * radius_m, workers=-1
+        cloud.points[witness], distance_upper_bound=2 * radius_m, workers=threads()
     )
     witness = witness[np.isfinite(distance)]
     for station in np.unique(cloud.station[witness]):
         own = witness[cloud.station[witness] == station]
         others = np.flatnonzero(cloud.station[at] != station)
         distance, _ = cKDTree(cloud.points[own]).query(
-            cloud.points[at[others]], distance_upper_bound=radius_m, workers=-1
+            cloud.points[at[others]], distance_upper_bound=radius_m, workers=threads()
         )
         found[others] |= np.isfinite(distance)
     return found

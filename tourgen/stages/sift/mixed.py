@@ -12,13 +12,15 @@ the picture may still have company in space (``rejoin.py``): rods, rims, tubes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from tourgen.geometry import Float32
 from tourgen.stages.sift.rejoin import rejoined
-from tourgen.stages.sift.views import View
+from tourgen.stages.sift.views import Surroundings, View
+from tourgen.threads import each
 
 Mask = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.int64]
@@ -50,11 +52,8 @@ def mixed(points: Float32, seen: Iterable[View], near_m: float) -> Mask:
         suspect = np.flatnonzero(~view.smooth)
         suspect = suspect[np.argsort(view.cell[suspect], kind="stable")]
         if len(view) > _NEAR and len(suspect):
-            around = view.around(suspect, _NEAR)
-            for at in view.blocks(suspect):
-                near = around.neighbours(at, _NEAR)
-                edge = _bent(view, at, near) & _between(view, at, near)
-                lonely[at[edge]] = ~_in_company(view, at[edge], near[edge])
+            look = partial(_lonely, view, view.around(suspect, _NEAR))
+            lonely[np.concatenate(each(look, view.blocks(suspect)))] = True
         at = view.index[lonely]
         alone[at] = True
         company[view.index[~lonely]] = True
@@ -64,6 +63,14 @@ def mixed(points: Float32, seen: Iterable[View], near_m: float) -> Mask:
     back = rejoined(points, found, way[found], spacing_m[found], noise_m[found], near_m)
     found[np.flatnonzero(found)[back]] = False
     return found
+
+
+def _lonely(view: View, around: Surroundings, at: Indices) -> Indices:
+    """Which of the points ``at`` of a view have no company in it."""
+    near = around.neighbours(at, _NEAR)
+    edge = _bent(view, at, near) & _between(view, at, near)
+    at, near = at[edge], near[edge]
+    return np.asarray(at[~_in_company(view, at, near)])
 
 
 def _bent(view: View, at: Indices, near: Indices) -> Mask:

@@ -17,7 +17,7 @@ from tourgen.stages.sift.picture import Picture, noise_by_range, picture
 from tourgen.stages.sight import depth_buffer
 
 _SIGHT_CELL_DEG = 0.5
-_BLOCK = 100_000
+_BLOCK = 20_000
 _BEAMS = 8
 """Looked for at once, mostly."""
 _SMOOTH = 2.0
@@ -154,7 +154,7 @@ class Surroundings:
         """(k, count) the nearest in direction of k points of the view, nearest first; ``count``
         is less than the number of points."""
         nearest = np.arange(1, count + 2)
-        near = np.asarray(self._tree.query(self._view.direction[at], k=nearest, workers=-1)[1])
+        near = np.asarray(self._tree.query(self._view.direction[at], k=nearest)[1])
         near = self._at[near]
         # Where several points lie in one direction, the point itself need not come first.
         own = near == at[:, None]

@@ -16,7 +16,7 @@ from tourgen.stages.surface.marching_cubes import Keys, corner_of, key_of
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.threads import in_parts
 
-_PART = 1 << 14
+_PART = 1 << 12
 _ACROSS = 0.1
 """Share of the weight across a crease from which on it is one."""
 _DENSEST, _SPARSEST = 0.5, 2.0
@@ -91,7 +91,8 @@ class Field:
         distance, far, _ = self._at(places, False)
         trust = np.clip((1 - far) / np.float32(_FADE), 0, 1)
         rest = trust < 1
-        theirs = np.maximum(beyond.distance(places[rest]), -_DEEPEST * self.cell_m)
+        most_m = _DEEPEST * self.cell_m
+        theirs = np.clip(beyond.distance(places[rest]), -most_m, most_m)
         distance[rest] = trust[rest] * distance[rest] + (1 - trust[rest]) * theirs
         return self._carved(places, distance, far)
 
@@ -233,13 +234,7 @@ def _over_round(
 
 
 class Beyond(Protocol):
-    """A surface that goes on where the points end.
-
-    Attributes:
-        seeds: (m, 3) float32, places on it, metres.
-    """
-
-    seeds: Float32
+    """A surface that goes on where the points end."""
 
     def distance(self, places: Float32) -> Float32:
         """(n,) metres that each of (n, 3) places lies in front of it."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from tourgen.geometry import Float64, Mesh
-from tourgen.rays import ray_scene
+from tourgen.rays import along, ray_scene
 from tourgen.stages.free_space import FreeSpace
 from tourgen.stages.surface.tubes import Rod
 
@@ -38,7 +38,8 @@ def on_footing(rods: tuple[Rod, ...], mesh: Mesh, free: FreeSpace) -> tuple[Rod,
     ends = np.array([end for rod in rods for end in _ends(rod)])
     ways = np.array([way for rod in rods for way in _ways(rod)])
     rays = np.concatenate([ends, ways], axis=1).astype(np.float32)
-    met = ray_scene(mesh.vertices, mesh.faces).cast_rays(rays)
+    near = along(mesh, ends, ways, _MOST_M)
+    met = ray_scene(near.vertices, near.faces).cast_rays(rays)
     front = np.einsum("ij,ij->i", met["primitive_normals"].numpy(), ways) < 0
     hit_m = np.where(front, met["t_hit"].numpy(), np.inf).reshape(-1, 2)
     return tuple(

@@ -2,6 +2,8 @@
 
 From a cell on to its neighbours across every face that the surface crosses (Wyvill, McPheeters and
 Wyvill 1986; Bloomenthal 1988), so that time and memory follow the area, not the room.
+
+All keys are kept sorted: what is found of them is merged, never sorted again.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from tourgen.compiled import compiled
 from tourgen.geometry import Float32
 from tourgen.stages.surface.marching_cubes import CELL_CORNERS, STEPS, Keys
 
@@ -31,25 +34,11 @@ def grown(
     """
     cells, fresh = np.empty(0, np.int64), distinct(seeds)
     while len(fresh):
-        cells = np.insert(cells, np.searchsorted(cells, fresh), fresh)
-        new = _without(distinct(fresh[:, None] + CELL_CORNERS), key)
-        at = np.searchsorted(key, new)
-        key, value = np.insert(key, at, new), np.insert(value, at, distance(new))
-        of_cells = value[np.searchsorted(key, fresh[:, None] + CELL_CORNERS)]
-        fresh = _without(distinct(_across_crossed_faces(fresh, of_cells, most_m)), cells)
+        cells = _union(cells, fresh)
+        new = _without(_corners(fresh), key)
+        key, value = _merged(key, value, new, distance(new))
+        fresh = _without(_across_crossed_faces(fresh, key, value, np.float32(most_m)), cells)
     return key, value
-
-
-def _across_crossed_faces(cells: Keys, value: Float32, most_m: float) -> Keys:
-    """The cells across those faces of ``cells`` that the surface crosses."""
-    found = []
-    for axis, step in enumerate(STEPS):
-        for side, way in ((0, -step), (1, step)):
-            face = value[:, [corner for corner in range(8) if corner >> axis & 1 == side]]
-            low, high = face.min(axis=1), face.max(axis=1)  # NaN where one is unknown
-            crossed = (low <= 0) & (high > 0) & (high - low < most_m)
-            found.append(cells[crossed] + way)
-    return np.concatenate(found)
 
 
 def distinct(keys: Keys) -> Keys:
@@ -59,9 +48,103 @@ def distinct(keys: Keys) -> Keys:
     return np.asarray(ordered[first], np.int64)
 
 
+def _corners(cells: Keys) -> Keys:
+    """The corners of sorted cells."""
+    found = cells
+    for step in STEPS:
+        found = _union(found, found + step)
+    return found
+
+
+def _across_crossed_faces(cells: Keys, key: Keys, value: Float32, most_m: np.float32) -> Keys:
+    """The cells across those faces of sorted cells that the surface crosses."""
+    crossed = _crossed(cells, key, value, most_m)
+    found = np.empty(0, np.int64)
+    for face in range(6):
+        step = STEPS[face >> 1] if face & 1 else -STEPS[face >> 1]
+        found = _union(found, cells[crossed[face]] + step)
+    return found
+
+
+@compiled
+def _crossed(cells: Keys, key: Keys, value: Float32, most_m: np.float32) -> np.ndarray:
+    """(6, n) whether the surface crosses each face of n cells; bit 0 of a face's number is the
+    side, the others are the axis."""
+    found = np.empty((6, len(cells)), np.bool_)
+    at = np.zeros(8, np.int64)
+    here = np.empty(8, np.float32)
+    for i in range(len(cells)):
+        for corner in range(8):
+            at[corner] = _place(key, cells[i] + CELL_CORNERS[corner], at[corner])
+            here[corner] = value[at[corner]]
+        for face in range(6):
+            low, high, known = np.float32(np.inf), np.float32(-np.inf), True
+            for corner in range(8):
+                if corner >> (face >> 1) & 1 == face & 1:
+                    known &= not np.isnan(here[corner])
+                    low, high = min(low, here[corner]), max(high, here[corner])
+            found[face, i] = known and low <= 0 and high > 0 and high - low < most_m
+    return found
+
+
+@compiled
+def _place(keys: Keys, key: int, start: int) -> int:
+    """Where a key stands among sorted keys, or would, not before ``start``: found by strides that
+    double, since it mostly is near (Bentley and Yao 1976)."""
+    stride, low = 1, start
+    while low + stride < len(keys) and keys[low + stride] < key:
+        low += stride
+        stride *= 2
+    high = min(low + stride, len(keys))
+    while low < high:
+        middle = (low + high) // 2
+        if keys[middle] < key:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@compiled
+def _union(a: Keys, b: Keys) -> Keys:
+    """The keys of both, sorted, each once; both are."""
+    found = np.empty(len(a) + len(b), np.int64)
+    i = j = count = 0
+    while i < len(a) and j < len(b):
+        found[count] = min(a[i], b[j])
+        i, j = i + (a[i] <= found[count]), j + (b[j] <= found[count])
+        count += 1
+    for rest, first in ((a, i), (b, j)):
+        for k in range(first, len(rest)):
+            found[count] = rest[k]
+            count += 1
+    return found[:count].copy()
+
+
+@compiled
 def _without(keys: Keys, known: Keys) -> Keys:
-    """The keys that are not among the known ones, all sorted."""
-    if not len(known):
-        return keys
-    at = np.minimum(np.searchsorted(known, keys), len(known) - 1)
-    return np.asarray(keys[known[at] != keys], np.int64)
+    """The sorted keys that are not among sorted known ones."""
+    found = np.empty(len(keys), np.int64)
+    count = at = 0
+    for key in keys:
+        at = _place(known, key, at)
+        if at == len(known) or known[at] != key:
+            found[count] = key
+            count += 1
+    return found[:count].copy()
+
+
+@compiled
+def _merged(key: Keys, value: Float32, new: Keys, distance: Float32) -> tuple[Keys, Float32]:
+    """Sorted keys with their values, and new ones among them, none of which is there."""
+    count = len(key) + len(new)
+    keys, values = np.empty(count, np.int64), np.empty(count, np.float32)
+    i = j = 0
+    for k in range(count):
+        if j == len(new) or (i < len(key) and key[i] < new[j]):
+            keys[k], values[k] = key[i], value[i]
+            i += 1
+        else:
+            keys[k], values[k] = new[j], distance[j]
+            j += 1
+    return keys, values

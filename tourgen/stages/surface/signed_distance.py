@@ -254,8 +254,7 @@ class Distances:
         rim = np.flatnonzero(beside(self.key, np.isnan(self.value)))
         value = self.value.copy()
         value[rim] = told(self.key[rim])
-        seeds = np.concatenate([field.seeds, field.cells(beyond.seeds)])
-        return _grown(field, told, seeds, self.key, value, _STEEPEST_ACROSS)
+        return _grown(field, told, field.seeds, self.key, value, _STEEPEST_ACROSS)
 
 
 def distances(
