@@ -10,10 +10,10 @@ SPLIT = " part "
 #: Seconds a megabyte of scan on one core, as the demo's rooms of 20 MB took; 0.02 for a stage not
 #: named.
 _SECONDS = {
-    "ownership": 0.3, "register": 0.28, "sift": 0.24, "exposure": 0.14, "spacing": 0.02,
-    "normals": 0.27, "surface": 1.15, "trim": 0.28, "hygiene": 0.1, "levels": 0.18, "tiles": 0.04,
-    "unwrap": 0.55, "floors": 0.19, "colors": 0.12, "bake": 0.45, "inferred": 0.05, "pack": 0.07,
-    "poster": 0.1, "measure": 0.08,
+    "stations": 0.05, "ownership": 0.3, "register": 0.22, "sift": 0.24, "exposure": 0.12,
+    "spacing": 0.02, "normals": 0.27, "surface": 1.0, "trim": 0.2, "hygiene": 0.09, "levels": 0.2,
+    "tiles": 0.04, "unwrap": 0.55, "floors": 0.1, "colors": 0.12, "bake": 0.45, "inferred": 0.05,
+    "pack": 0.08, "poster": 0.15, "measure": 0.08,
 }  # fmt: skip
 #: Stages that work on the surface, which grows less than the scan: its detail has an end.
 _OF_THE_SURFACE = {

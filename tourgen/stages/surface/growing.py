@@ -3,7 +3,9 @@
 From a cell on to its neighbours across every face that the surface crosses (Wyvill, McPheeters and
 Wyvill 1986; Bloomenthal 1988), so that time and memory follow the area, not the room.
 
-All keys are kept sorted: what is found of them is merged, never sorted again.
+All keys are kept sorted: what is found of them is merged, never sorted again. A gap is crossed in
+hundreds of small rounds, so what they find is kept apart and merged into the rest when it is worth
+it.
 """
 
 from __future__ import annotations
@@ -11,10 +13,16 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 
 from tourgen.compiled import compiled
 from tourgen.geometry import Float32
 from tourgen.stages.surface.marching_cubes import CELL_CORNERS, STEPS, Keys
+
+_WORTH = 0.125
+"""Of what is known, the share found lately from which on it is merged."""
+_NO_KEYS: Keys = np.empty(0, np.int64)
+_NO_VALUES: Float32 = np.empty(0, np.float32)
 
 
 def grown(
@@ -32,13 +40,44 @@ def grown(
     Returns:
         Sorted keys and their distances; see ``marching_cubes``.
     """
-    cells, fresh = np.empty(0, np.int64), distinct(seeds)
+    told = _Told(key, value)
+    cells, lately, fresh = _NO_KEYS, _NO_KEYS, distinct(seeds)
     while len(fresh):
-        cells = _union(cells, fresh)
-        new = _without(_corners(fresh), key)
-        key, value = _merged(key, value, new, distance(new))
-        fresh = _without(_across_crossed_faces(fresh, key, value, np.float32(most_m)), cells)
-    return key, value
+        lately = _union(lately, fresh)
+        told.add(distance, _corners(fresh))
+        crossed = told.crossed(fresh, np.float32(most_m))
+        fresh = _without(_without(_across(fresh, crossed), cells), lately)
+        if len(lately) > _WORTH * len(cells):
+            cells, lately = _union(cells, lately), _NO_KEYS
+            told.settle()
+    told.settle()
+    return told.key, told.value
+
+
+class _Told:
+    """Corners with their distances, those told lately apart."""
+
+    def __init__(self, key: Keys, value: Float32) -> None:
+        self.key, self.value = key, value
+        self._late_key, self._late_value = _NO_KEYS, _NO_VALUES
+
+    def add(self, distance: Callable[[Keys], Float32], corners: Keys) -> None:
+        """Have those told that are not."""
+        new = _without(_without(corners, self.key), self._late_key)
+        late = self._late_key, self._late_value
+        self._late_key, self._late_value = _merged(*late, new, distance(new))
+
+    def settle(self) -> None:
+        """Merge what was told lately into the rest."""
+        late = self._late_key, self._late_value
+        self.key, self.value = _merged(self.key, self.value, *late)
+        self._late_key, self._late_value = _NO_KEYS, _NO_VALUES
+
+    def crossed(self, cells: Keys, most_m: np.float32) -> npt.NDArray[np.bool_]:
+        """(6, n) whether the surface crosses each face of n cells; bit 0 of a face's number is
+        the side, the others are the axis."""
+        told = self.key, self.value, self._late_key, self._late_value
+        return _crossed(cells, *told, most_m)
 
 
 def distinct(keys: Keys) -> Keys:
@@ -56,10 +95,9 @@ def _corners(cells: Keys) -> Keys:
     return found
 
 
-def _across_crossed_faces(cells: Keys, key: Keys, value: Float32, most_m: np.float32) -> Keys:
-    """The cells across those faces of sorted cells that the surface crosses."""
-    crossed = _crossed(cells, key, value, most_m)
-    found = np.empty(0, np.int64)
+def _across(cells: Keys, crossed: npt.NDArray[np.bool_]) -> Keys:
+    """The cells across crossed faces of sorted cells."""
+    found = _NO_KEYS
     for face in range(6):
         step = STEPS[face >> 1] if face & 1 else -STEPS[face >> 1]
         found = _union(found, cells[crossed[face]] + step)
@@ -67,22 +105,33 @@ def _across_crossed_faces(cells: Keys, key: Keys, value: Float32, most_m: np.flo
 
 
 @compiled
-def _crossed(cells: Keys, key: Keys, value: Float32, most_m: np.float32) -> np.ndarray:
-    """(6, n) whether the surface crosses each face of n cells; bit 0 of a face's number is the
-    side, the others are the axis."""
+def _crossed(
+    cells: Keys,
+    key: Keys,
+    value: Float32,
+    late_key: Keys,
+    late_value: Float32,
+    most_m: np.float32,
+) -> npt.NDArray[np.bool_]:
+    """See ``_Told.crossed``."""
     found = np.empty((6, len(cells)), np.bool_)
-    at = np.zeros(8, np.int64)
+    at, late = np.zeros(8, np.int64), np.zeros(8, np.int64)
     here = np.empty(8, np.float32)
     for i in range(len(cells)):
-        for corner in range(8):
-            at[corner] = _place(key, cells[i] + CELL_CORNERS[corner], at[corner])
-            here[corner] = value[at[corner]]
+        for c in range(8):
+            corner = cells[i] + CELL_CORNERS[c]
+            at[c] = _place(key, corner, at[c])
+            if at[c] < len(key) and key[at[c]] == corner:
+                here[c] = value[at[c]]
+            else:
+                late[c] = _place(late_key, corner, late[c])
+                here[c] = late_value[late[c]]
         for face in range(6):
             low, high, known = np.float32(np.inf), np.float32(-np.inf), True
-            for corner in range(8):
-                if corner >> (face >> 1) & 1 == face & 1:
-                    known &= not np.isnan(here[corner])
-                    low, high = min(low, here[corner]), max(high, here[corner])
+            for c in range(8):
+                if c >> (face >> 1) & 1 == face & 1:
+                    known &= not np.isnan(here[c])
+                    low, high = min(low, here[c]), max(high, here[c])
             found[face, i] = known and low <= 0 and high > 0 and high - low < most_m
     return found
 
