@@ -48,7 +48,9 @@ def test_every_cell_that_a_sphere_enters_is_found(
     # A row of cells from within to without: the surface enters one of them.
     row = np.concatenate([cell_at(x, 0.01, 0.01) for x in np.arange(0.05, 2, CELL_M)])
     before = distinct(row[:, None] + CELL_CORNERS)[:known]
-    key, value = grown(told, row, before, distance(before), 1.0)
+    found = grown(told, row, before, distance(before), 1.0)
+    key, value = found.key, found.value
+    assert not len(found.outside)
     assert (np.diff(key) > 0).all()
     assert (value == distance(key)).all()
     once = np.concatenate([*asked, before])
@@ -69,8 +71,8 @@ def test_it_does_not_cross_a_jump_or_what_is_unknown() -> None:
         value[np.abs(places(key)[:, 1]) > 0.51] = np.nan
         return value
 
-    key, _ = grown(told, cell_at(0.01, 0.01, 0.01), *_nothing(), 0.15)
-    x = places(key)[:, 0]
+    found = grown(told, cell_at(0.01, 0.01, 0.01), *_nothing(), 0.15)
+    x = places(found.key)[:, 0]
     assert -1.3 < x.min() < -0.95
     assert 0.95 < x.max() < 1.3
 

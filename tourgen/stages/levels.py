@@ -15,6 +15,7 @@ import numpy as np
 from tourgen.geometry import Mesh
 from tourgen.stages.halving import halved
 from tourgen.stages.mesh_arrays import compact, face_areas, on_grid, weld
+from tourgen.stages.simplify import simplified
 
 VERSION = 3
 _BLOCK_FACES = 1_000_000
@@ -61,7 +62,7 @@ def _simplify(mesh: Mesh, faces: int) -> Mesh:
         return on_grid(mesh)
     if len(mesh.faces) > max(_BLOCK_FACES, 2 * _LEFT * faces):
         mesh = _by_blocks(mesh, _LEFT * faces / len(mesh.faces))
-    return on_grid(_simplified(mesh, faces))
+    return on_grid(simplified(mesh, faces))
 
 
 def _by_blocks(mesh: Mesh, share: float) -> Mesh:
@@ -70,17 +71,8 @@ def _by_blocks(mesh: Mesh, share: float) -> Mesh:
     block = halved(mesh, count)
     return weld(
         [
-            _simplified(each, int(share * len(each.faces)), preserve_border=True)
+            simplified(each, int(share * len(each.faces)), preserve_border=True)
             for number in range(count)
             for each in (compact(mesh, block == number),)
         ]
     )
-
-
-def _simplified(mesh: Mesh, faces: int, *, preserve_border: bool = False) -> Mesh:
-    import fast_simplification
-
-    vertices, triangles = fast_simplification.simplify(
-        mesh.vertices, mesh.faces, target_count=faces, agg=5, preserve_border=preserve_border
-    )
-    return Mesh(mesh.origin, vertices.astype(np.float32), triangles.astype(np.int32))

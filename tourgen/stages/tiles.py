@@ -21,6 +21,7 @@ from tourgen.rays import ray_scene
 from tourgen.stages.halving import halved
 from tourgen.stages.levels import Levels
 from tourgen.stages.mesh_arrays import compact, components, face_adjacency, on_grid, weld
+from tourgen.stages.simplify import simplified
 
 VERSION = 3
 _ISLAND_FACES = 60
@@ -110,24 +111,12 @@ def _subtree(name: str, leaves: list[Mesh], settings: Settings) -> tuple[Tile, .
     below = _children(name, leaves, settings)
     tops = [subtree[0] for subtree in below]
     fine = weld([top.mesh for top in tops])
-    mesh = _simplify_locked(fine, settings.branch_ratio)
+    mesh = on_grid(
+        simplified(fine, int(len(fine.faces) * settings.branch_ratio), preserve_border=True)
+    )
     error_m = max(_deviation_m(fine, mesh), 1e-4) + max(top.geometric_error_m for top in tops)
     top = Tile(name, mesh, error_m, tuple(child.id for child in tops))
     return (top, *(tile for subtree in below for tile in subtree))
-
-
-def _simplify_locked(mesh: Mesh, ratio: float) -> Mesh:
-    """Simplify without touching the border."""
-    import fast_simplification
-
-    vertices, faces = fast_simplification.simplify(
-        mesh.vertices,
-        mesh.faces,
-        target_count=int(len(mesh.faces) * ratio),
-        agg=5,
-        preserve_border=True,
-    )
-    return on_grid(Mesh(mesh.origin, vertices.astype(np.float32), faces.astype(np.int32)))
 
 
 def _deviation_m(fine: Mesh, coarse: Mesh) -> float:

@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tourgen.geometry import Mesh, OrientedCloud
+from tourgen.geometry import Float64, Mesh, OrientedCloud
 from tourgen.neighbours import Neighbours
 from tourgen.stages.free_space import LOWEST_DEG, FreeSpace, free_space
 from tourgen.stages.mesh_arrays import face_areas
@@ -58,11 +58,14 @@ class Settings:
         alone: Of the solve where it is left alone.
         least_share: The share of the area within reach of the planes from which on the signed
             distance is worth it, 0 to 1.
+        most_cells: So many cells that the surface enters are held at once; of a larger room it is
+            drawn by blocks, and twice as many faces are left.
     """
 
     distance: signed_distance.Settings
     alone: poisson.Settings
     least_share: float = 0.33
+    most_cells: float = 6e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,17 +98,47 @@ def auto(oriented: OrientedCloud, settings: Settings) -> Chosen:
     shapes = signed_distance.shapes(oriented, settings.distance)
     planes, origin = shapes.planes, oriented.cloud.origin
     free = _free(oriented, planes.noise_m)
-    known = signed_distance.distances(planes, settings.distance, free)
-    dense = known.zero_set(origin, sharp=False)
-    if not len(dense.faces):
+    mesh = _closed(planes, settings, free, origin)
+    if not len(mesh.faces):
         return Chosen(poisson.poisson(oriented, settings.alone), 0.0)
-    mesh = known.carried_on(Winding(dense, settings.distance.cell_m)).zero_set(origin)
     share = _near_share(mesh, planes, settings.distance.reach * settings.distance.spacing_m)
     if share < settings.least_share:
         return Chosen(poisson.poisson(oriented, settings.alone), 0.0)
     if free:
         shapes = replace(shapes, rods=on_footing(shapes.rods, mesh, free))
     return Chosen(shapes.with_rods(mesh, settings.distance), share)
+
+
+def _closed(
+    planes: TangentPlanes, settings: Settings, free: FreeSpace | None, origin: Float64
+) -> Mesh:
+    """The surface of the planes, its gaps closed; no faces where there is none."""
+    asked = settings.distance
+    over = signed_distance.cells_expected(planes, asked.cell_m) / settings.most_cells
+    if over > 1:
+        return _closed_by_blocks(planes, settings, free, origin, over)
+    known = signed_distance.distances(planes, asked, free)
+    drawn = known.zero_set(origin, sharp=False)
+    if not len(drawn.faces):
+        return drawn
+    return known.carried_on(Winding(drawn, asked.cell_m)).zero_set(origin)
+
+
+def _closed_by_blocks(
+    planes: TangentPlanes,
+    settings: Settings,
+    free: FreeSpace | None,
+    origin: Float64,
+    over: float,
+) -> Mesh:
+    """The same of a room that has ``over`` times the cells that are held at once."""
+    given = planes, settings.distance, free, origin, 2 * settings.most_cells
+    drawn = signed_distance.zero_set_by_blocks(*given)
+    if not len(drawn.faces):
+        return drawn
+    winding = Winding(drawn, settings.distance.cell_m * float(np.sqrt(over)))
+    del drawn
+    return signed_distance.zero_set_by_blocks(*given, winding)
 
 
 def _free(oriented: OrientedCloud, noise_m: float) -> FreeSpace | None:

@@ -11,6 +11,7 @@ it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -25,10 +26,33 @@ _NO_KEYS: Keys = np.empty(0, np.int64)
 _NO_VALUES: Float32 = np.empty(0, np.float32)
 
 
+Within = Callable[[Keys], npt.NDArray[np.bool_]]
+
+
+@dataclass(frozen=True, slots=True)
+class Grown:
+    """All cells that a surface enters.
+
+    Attributes:
+        key: (n,) of their corners, sorted; see ``marching_cubes``.
+        value: (n,) the distance at each, metres.
+        outside: Cells that the surface enters, from within, where it was not followed.
+    """
+
+    key: Keys
+    value: Float32
+    outside: Keys
+
+
 def grown(
-    distance: Callable[[Keys], Float32], seeds: Keys, key: Keys, value: Float32, most_m: float
-) -> tuple[Keys, Float32]:
-    """Corners and distances of all cells that a surface enters.
+    distance: Callable[[Keys], Float32],
+    seeds: Keys,
+    key: Keys,
+    value: Float32,
+    most_m: float,
+    within: Within | None = None,
+) -> Grown:
+    """Follow a surface from cell to cell.
 
     Args:
         distance: Of (n,) corners, metres, NaN where it is unknown.
@@ -36,22 +60,23 @@ def grown(
         key: (m,) corners whose distance is told already, sorted.
         value: (m,) their distances.
         most_m: A face along which the distance changes by more is not crossed: it jumps there.
-
-    Returns:
-        Sorted keys and their distances; see ``marching_cubes``.
+        within: Tells of (n,) cells which are to be entered; None: all.
     """
-    told = _Told(key, value)
+    told, outside = _Told(key, value), _NO_KEYS
     cells, lately, fresh = _NO_KEYS, _NO_KEYS, distinct(seeds)
     while len(fresh):
-        lately = _union(lately, fresh)
+        lately = union(lately, fresh)
         told.add(distance, _corners(fresh))
         crossed = told.crossed(fresh, np.float32(most_m))
-        fresh = _without(_without(_across(fresh, crossed), cells), lately)
+        fresh = without(without(_across(fresh, crossed), cells), lately)
+        if within:
+            inside = within(fresh)
+            outside, fresh = union(outside, fresh[~inside]), fresh[inside]
         if len(lately) > _WORTH * len(cells):
-            cells, lately = _union(cells, lately), _NO_KEYS
+            cells, lately = union(cells, lately), _NO_KEYS
             told.settle()
     told.settle()
-    return told.key, told.value
+    return Grown(told.key, told.value, outside)
 
 
 class _Told:
@@ -63,7 +88,7 @@ class _Told:
 
     def add(self, distance: Callable[[Keys], Float32], corners: Keys) -> None:
         """Have those told that are not."""
-        new = _without(_without(corners, self.key), self._late_key)
+        new = without(without(corners, self.key), self._late_key)
         late = self._late_key, self._late_value
         self._late_key, self._late_value = _merged(*late, new, distance(new))
 
@@ -91,7 +116,7 @@ def _corners(cells: Keys) -> Keys:
     """The corners of sorted cells."""
     found = cells
     for step in STEPS:
-        found = _union(found, found + step)
+        found = union(found, found + step)
     return found
 
 
@@ -100,7 +125,7 @@ def _across(cells: Keys, crossed: npt.NDArray[np.bool_]) -> Keys:
     found = _NO_KEYS
     for face in range(6):
         step = STEPS[face >> 1] if face & 1 else -STEPS[face >> 1]
-        found = _union(found, cells[crossed[face]] + step)
+        found = union(found, cells[crossed[face]] + step)
     return found
 
 
@@ -155,7 +180,7 @@ def _place(keys: Keys, key: int, start: int) -> int:
 
 
 @compiled
-def _union(a: Keys, b: Keys) -> Keys:
+def union(a: Keys, b: Keys) -> Keys:
     """The keys of both, sorted, each once; both are."""
     found = np.empty(len(a) + len(b), np.int64)
     i = j = count = 0
@@ -171,7 +196,7 @@ def _union(a: Keys, b: Keys) -> Keys:
 
 
 @compiled
-def _without(keys: Keys, known: Keys) -> Keys:
+def without(keys: Keys, known: Keys) -> Keys:
     """The sorted keys that are not among sorted known ones."""
     found = np.empty(len(keys), np.int64)
     count = at = 0

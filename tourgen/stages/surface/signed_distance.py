@@ -49,6 +49,7 @@ from tourgen.extent import extent
 from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud
 from tourgen.stages.free_space import FreeSpace
 from tourgen.stages.sift.strays import clusters
+from tourgen.stages.surface.blocks import drawn_by_blocks
 from tourgen.stages.surface.field import Beyond, Field
 from tourgen.stages.surface.flats import flattened
 from tourgen.stages.surface.growing import grown
@@ -77,6 +78,7 @@ _HANDFUL = 12
 """Fewer points that stand apart from all others are strays."""
 _TUBE = 2.0
 """Length of the faces of a rod's tube, in cells."""
+_FACES_A_CELL = 2.0
 _STEEPEST = 1.8
 """Most change of the distance over the way: 1, and more for the blend and for what was hardly seen.
 At 1.2 edges gape of which one side was (chamber1: 98.97 instead of 99.24 % of what is seen within
@@ -254,14 +256,58 @@ class Distances:
         rim = np.flatnonzero(beside(self.key, np.isnan(self.value)))
         value = self.value.copy()
         value[rim] = told(self.key[rim])
-        return _grown(field, told, field.seeds, self.key, value, _STEEPEST_ACROSS)
+        return _grown(field, told, self.key, value, _STEEPEST_ACROSS)
 
 
 def distances(
     planes: TangentPlanes, settings: Settings, free: FreeSpace | None = None
 ) -> Distances:
     """The distance to tangent planes, from the cells with points on, what is free cut out."""
-    field = Field(
+    field = _field(planes, settings, free)
+    nothing = np.empty(0, np.int64), np.empty(0, np.float32)
+    return _grown(field, field.distance, *nothing, _STEEPEST)
+
+
+def zero_set_by_blocks(
+    planes: TangentPlanes,
+    settings: Settings,
+    free: FreeSpace | None,
+    origin: Float64,
+    most_faces: float,
+    beyond: Beyond | None = None,
+) -> Mesh:
+    """Where the distance is zero, of a room of so many cells that they are not held at once.
+
+    Args:
+        planes: See ``distances``.
+        settings: See ``Settings``.
+        free: See ``distances``.
+        origin: Of the mesh.
+        most_faces: About so many are left.
+        beyond: Another surface that it fades into where it becomes unknown; creases are drawn sharp
+            then.
+    """
+    field = _field(planes, settings, free)
+    steepest = _STEEPEST_ACROSS if beyond else _STEEPEST
+
+    def told(key: Keys) -> Float32:
+        return field.carried_on(key, beyond) if beyond else field.distance(key)
+
+    def draw(key: Keys, value: Float32) -> Mesh:
+        return Distances(field, key, value, steepest).zero_set(origin, sharp=beyond is not None)
+
+    expected = _FACES_A_CELL * cells_expected(planes, settings.cell_m)
+    share = min(most_faces / expected, 1.0)
+    return drawn_by_blocks(told, draw, field.seeds, _most_m(field, steepest), share)
+
+
+def cells_expected(planes: TangentPlanes, cell_m: float) -> float:
+    """About how many cells the surface enters."""
+    return float(np.square(planes.spacing_m, dtype=np.float64).sum()) / cell_m**2
+
+
+def _field(planes: TangentPlanes, settings: Settings, free: FreeSpace | None) -> Field:
+    return Field(
         planes,
         settings.cell_m,
         settings.spacing_m,
@@ -270,17 +316,19 @@ def distances(
         settings.blend,
         free,
     )
-    nothing = np.empty(0, np.int64), np.empty(0, np.float32)
-    return _grown(field, field.distance, field.seeds, *nothing, _STEEPEST)
+
+
+def _most_m(field: Field, steepest: float) -> float:
+    """How much the distance may change along a face of a cell."""
+    return float(np.sqrt(2) * steepest * field.cell_m)
 
 
 def _grown(
     field: Field,
     told: Callable[[Keys], Float32],
-    seeds: Keys,
     key: Keys,
     value: Float32,
     steepest: float,
 ) -> Distances:
-    most_m = float(np.sqrt(2) * steepest * field.cell_m)
-    return Distances(field, *grown(told, seeds, key, value, most_m), steepest)
+    found = grown(told, field.seeds, key, value, _most_m(field, steepest))
+    return Distances(field, found.key, found.value, steepest)
