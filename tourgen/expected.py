@@ -22,7 +22,7 @@ _OF_THE_SURFACE = {
 }  # fmt: skip
 _USUAL_MB, _GROWTH = 20.0, 0.66
 #: Stages that leave cores idle: most of their work is of the kind that one thread must do.
-_ON_ONE_CORE = {"surface", "trim", "hygiene", "levels"}
+_ON_ONE_CORE = {"trim", "hygiene", "levels"}
 #: Peak megabytes a megabyte of scan, beyond those of a process at rest: a room of 228 MB.
 _MEMORY = {"sift": 9, "surface": 12, "trim": 10, "levels": 9, "colors": 10}
 _REST_MB = 300

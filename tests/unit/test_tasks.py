@@ -212,7 +212,7 @@ def test_tasks_that_wait_for_nothing_run_at_once(tmp_path: Path) -> None:
 
 
 def test_what_little_depends_on_runs_where_cores_idle(tmp_path: Path) -> None:
-    """Exposure waits for the surface, which works on one core, and the normals get both."""
+    """Exposure waits for the trimming, which works on one core, and the normals get both."""
     told: list[str] = []
     starts: list[tuple[str, int]] = []
 
@@ -227,7 +227,7 @@ def test_what_little_depends_on_runs_where_cores_idle(tmp_path: Path) -> None:
             future: Future[Any] = Future()
             self.open.append(future)
             function(*arguments)
-            if told[-1] != "surface":  # it lasts until something runs beside it
+            if told[-1] != "trim":  # it lasts until something runs beside it
                 for each in self.open:
                     each.set_result(None)
                 self.open.clear()
@@ -239,10 +239,10 @@ def test_what_little_depends_on_runs_where_cores_idle(tmp_path: Path) -> None:
     scan = task("scan", lambda: 1, version=1)
     normals = task("normals", lambda n: n, scan, version=1)
     exposure = task("exposure", lambda n: n, scan, version=1)
-    surface = task("surface", lambda n: n, normals, version=1)
-    wanted = {"room": RoomTasks((surface, exposure), 20.0)}
+    trim = task("trim", lambda n: n, normals, version=1)
+    wanted = {"room": RoomTasks((trim, exposure), 20.0)}
     run_missing(wanted, Cache(tmp_path), Two(), lambda _, stage, __: told.append(stage))
-    assert starts == [("scan", 2), ("normals", 2), ("surface", 2), ("exposure", 1)]
+    assert starts == [("scan", 2), ("normals", 2), ("trim", 2), ("exposure", 1)]
 
 
 def test_a_plan_says_why(tmp_path: Path) -> None:

@@ -47,11 +47,16 @@ from tourgen.threads import each, in_parts
 
 __all__ = ["VERSION", "Ownership", "Settings", "ownership"]
 
-VERSION = 8
+VERSION = 9
 Ints = npt.NDArray[np.int64]
 _BLOCK = 200_000
 _ABOUT_M = 0.03
 """How uncertain a place is that was found by its blind disc."""
+_TRIES = 6
+"""Of a grid so fine that only the narrowest windows answer, but clearly: tenths of a millimetre
+off its place already blur it."""
+_CLEAR_SHARE = 0.2
+"""Of the points that lie on such a grid: none better is looked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +133,8 @@ def _grid(
 ) -> Grid | None:
     """The grid of the station near a place, or None."""
     tries: list[tuple[float, int, Windows, Float64, float]] = []
-    for number, window_deg in enumerate(settings.windows_deg):
+    windows_deg = settings.windows_deg
+    for number, window_deg in enumerate(windows_deg):
         windows = windows_about(points, place, window_deg, settings, rng)
         if windows is not None:
             there, frequency, answer = rough(windows, place, window_deg, settings)
@@ -140,23 +146,46 @@ def _grid(
     answer, number, windows, place, frequency = max(tries, key=lambda each: each[0])
     if answer < settings.least_answer:
         return None
+    best, most = None, settings.least_share
+    clear = answer >= settings.clear_answer and windows_deg[number] == windows_deg[-1]
+    for _ in range(_TRIES if clear else 1):
+        grid, share = _refined(points, windows, number, place, frequency, settings, rng)
+        if grid and share >= most:
+            best, most = grid, share
+        if most >= _CLEAR_SHARE:
+            break
+    return best
+
+
+def _refined(
+    points: Float32,
+    windows: Windows,
+    number: int,
+    place: Float64,
+    frequency: float,
+    settings: Settings,
+    rng: np.random.Generator,
+) -> tuple[Grid | None, float]:
+    """The grid of a station from where its narrowest windows say it is, if there is one, and the
+    share of points on it: some windows that are drawn lead astray."""
     narrowest_deg = settings.windows_deg[number]
     for window_deg in settings.windows_deg[number::-1]:
         about_m = _ABOUT_M * narrowest_deg / window_deg
         place, frequency = climbed(windows, place, frequency, window_deg, about_m)
-        windows = windows_about(points, place, window_deg, settings, rng)
-        if windows is None:
-            return None
+        wider = windows_about(points, place, window_deg, settings, rng)
+        if wider is None:
+            return None, 0.0
+        windows = wider
     place, frequency = agreeing(windows, place, frequency)
     fits = fitted(windows, place, frequency)
     if max(agreement for _, agreement in fits) < settings.least_agreement / np.sqrt(
         len(windows.points)
     ):
-        return None
+        return None, 0.0
     sample = points[drawn(len(points), settings.polish_points, rng)]
     sample = sample[np.abs(angles(sample, place)[0]) < HIGHEST_DEG]
     grids = each(lambda fit: polished(fit[0], sample, settings), fits)
     grids = [grid for grid in grids if grid.is_as_fine_as(settings.step_deg)]
     shares = [float((grid.off(sample) < settings.most_off / 4).mean()) for grid in grids]
     best = int(np.argmax(shares)) if shares else -1
-    return grids[best] if shares and shares[best] >= settings.least_share else None
+    return (grids[best], shares[best]) if shares else (None, 0.0)

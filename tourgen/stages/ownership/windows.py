@@ -16,6 +16,8 @@ HIGHEST_DEG = 75.0
 """Windows nearer the zenith hold all azimuths."""
 _SAMPLE = 600_000
 _LARGEST_SAMPLE = 6_000_000
+_BLOCK = 1 << 20
+_ROWS, _COLUMNS = 181, 361
 _SEVERAL = 10
 _LEAST_STEPS = 4
 """Of a grid in a window: less is its own width."""
@@ -65,24 +67,23 @@ def windows_about(
     rng: np.random.Generator,
 ) -> Windows | None:
     """Windows of points that can be seen from a place; None where there are too few."""
-    wanted = int(min(_SAMPLE * (settings.windows_deg[0] / window_deg) ** 2, _LARGEST_SAMPLE))
-    sample = points[drawn(len(points), wanted, rng)]
-    elevation, azimuth, reach = angles(sample, place)
-    near = _nearest(elevation, azimuth, reach)
-    order = np.flatnonzero(near)[np.argsort(elevation[near])]
-    sample, elevation, azimuth, reach = (
-        sample[order],
-        elevation[order],
-        azimuth[order],
-        reach[order],
-    )
+    wanted = int(_SAMPLE * (settings.windows_deg[0] / window_deg) ** 2)
+    sample = points[drawn(len(points), min(wanted, _LARGEST_SAMPLE), rng)]
+    nearest_m = _nearest_m(sample, place)
+    sample, elevation, azimuth, reach = _in_front(sample, place, nearest_m)
     half = window_deg / 2
+    seeds = rng.permutation(len(sample))[: 4 * settings.windows]
+    middles = list(zip(elevation[seeds], azimuth[seeds], reach[seeds], strict=True))
+    if min(wanted, len(points)) > _LARGEST_SAMPLE:
+        share = min(wanted / len(points), 1.0)
+        sample = _about(points, place, elevation[seeds], azimuth[seeds], window_deg, share, rng)
+        sample, elevation, azimuth, reach = _in_front(sample, place, nearest_m)
     chosen: list[npt.NDArray[np.int64]] = []
-    for seed in rng.permutation(len(sample))[: 4 * settings.windows]:
-        low, high = np.searchsorted(elevation, elevation[seed] + (-half, half))
-        aside = (azimuth[low:high] - azimuth[seed] + 180) % 360 - 180
-        alike = np.abs(aside) * np.cos(np.radians(elevation[seed])) < half
-        alike &= np.abs(reach[low:high] / reach[seed] - 1) < 0.1
+    for up, turn, away in middles:
+        low, high = np.searchsorted(elevation, up + np.array([-half, half]))
+        aside = (azimuth[low:high] - turn + 180) % 360 - 180
+        alike = np.abs(aside) * np.cos(np.radians(up)) < half
+        alike &= np.abs(reach[low:high] / away - 1) < 0.1
         window = low + np.flatnonzero(alike)
         if len(window) >= settings.window_points // 3:
             chosen.append(rng.permutation(window)[: settings.window_points])
@@ -105,14 +106,58 @@ def drawn(count: int, wanted: int, rng: np.random.Generator) -> npt.NDArray[np.i
     return np.unique(rng.integers(0, count, wanted))
 
 
-def _nearest(elevation: Float64, azimuth: Float64, reach: Float64) -> npt.NDArray[np.bool_]:
-    """Mask of what no other point hides, by cells of a degree."""
-    cell = np.floor(elevation + 90).astype(int) * 361 + np.floor(azimuth + 180).astype(int)
-    nearest = np.full(181 * 361, np.inf)
-    np.minimum.at(nearest, cell, reach)
-    return np.asarray(
-        (reach < 1.08 * nearest[cell] + 0.03) & (reach > 0.4) & (np.abs(elevation) < HIGHEST_DEG)
-    )
+def _cells(elevation: Float64, azimuth: Float64) -> npt.NDArray[np.int64]:
+    """(n,) cell of a degree that directions lie in."""
+    rows = np.floor(elevation + 90).astype(np.int64)
+    return np.asarray(rows * _COLUMNS + np.floor(azimuth + 180).astype(np.int64))
+
+
+def _nearest_m(points: Float32, place: Float64) -> Float64:
+    """Range of the nearest point in each cell of a degree."""
+    elevation, azimuth, reach = angles(points, place)
+    nearest = np.full(_ROWS * _COLUMNS, np.inf)
+    np.minimum.at(nearest, _cells(elevation, azimuth), reach)
+    return nearest
+
+
+def _in_front(
+    points: Float32, place: Float64, nearest_m: Float64
+) -> tuple[Float32, Float64, Float64, Float64]:
+    """The points that no other hides, by elevation, with their angles and range."""
+    elevation, azimuth, reach = angles(points, place)
+    near = reach < 1.08 * nearest_m[_cells(elevation, azimuth)] + 0.03
+    near &= (reach > 0.4) & (np.abs(elevation) < HIGHEST_DEG)
+    order = np.flatnonzero(near)[np.argsort(elevation[near])]
+    return points[order], elevation[order], azimuth[order], reach[order]
+
+
+def _about(
+    points: Float32,
+    place: Float64,
+    elevation: Float64,
+    azimuth: Float64,
+    window_deg: float,
+    share: float,
+    rng: np.random.Generator,
+) -> Float32:
+    """A share of the points that lie in some windows, and of some beside: narrow windows hold
+    enough points only of so many that they cannot be held at once."""
+    looked_at = np.zeros((_ROWS, _COLUMNS), np.bool_)
+    half = window_deg / 2
+    wide = half / np.cos(np.radians(np.clip(elevation, -HIGHEST_DEG, HIGHEST_DEG)))
+    for up in np.linspace(-half, half, int(np.ceil(window_deg)) + 1):
+        for turn in np.linspace(-1, 1, int(np.ceil(2 * wide.max())) + 1):
+            around = (azimuth + turn * wide + 180) % 360 - 180
+            looked_at.ravel()[_cells(np.clip(elevation + up, -90, 90), around)] = True
+    found = []
+    for first in range(0, len(points), _BLOCK):
+        block = points[first : first + _BLOCK]
+        up, turn, _ = angles(block, place)
+        kept = looked_at.ravel()[_cells(up, turn)]
+        if share < 1:
+            kept &= rng.random(len(block)) < share
+        found.append(block[kept])
+    return np.concatenate(found)
 
 
 def rough(
