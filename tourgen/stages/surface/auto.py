@@ -28,16 +28,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tourgen.geometry import Float64, Mesh, OrientedCloud
+from tourgen.geometry import Float32, Float64, Mesh, OrientedCloud, PointCloud
 from tourgen.neighbours import Neighbours
+from tourgen.rays import ray_scene
 from tourgen.stages.free_space import LOWEST_DEG, FreeSpace, free_space
-from tourgen.stages.mesh_arrays import face_areas
+from tourgen.stages.mesh_arrays import face_areas, vertex_normals
 from tourgen.stages.surface import poisson, signed_distance
 from tourgen.stages.surface.footing import on_footing
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.stages.surface.winding import Winding
+from tourgen.voxels import voxel_groups
 
-VERSION = 15
+VERSION = 16
 _VOID_DEG = 0.75
 """Where six beams do not lie nearer in direction, nothing is known of what they went through."""
 _MOST_BEAMS = 10_000_000
@@ -121,7 +123,10 @@ def _closed(
     drawn = known.zero_set(origin, sharp=False)
     if not len(drawn.faces):
         return drawn
-    return known.carried_on(Winding(drawn, asked.cell_m)).zero_set(origin)
+    # Who passed by stays where nobody knows who measured him: his winding number flares out to the
+    # floor, a solve closes him tight.
+    beyond = Winding(drawn, asked.cell_m) if free else _Solved(drawn, 2 * asked.cell_m)
+    return known.carried_on(beyond).zero_set(origin)
 
 
 def _closed_by_blocks(
@@ -139,6 +144,32 @@ def _closed_by_blocks(
     winding = Winding(drawn, settings.distance.cell_m * float(np.sqrt(over)))
     del drawn
     return signed_distance.zero_set_by_blocks(*given, winding)
+
+
+class _Solved:
+    """A closed surface by the Poisson solve; see ``signed_distance.Beyond``."""
+
+    def __init__(self, drawn: Mesh, cell_m: float) -> None:
+        order, starts = voxel_groups(drawn.vertices, cell_m / 2)
+        at = order[starts]
+        nobody, black = np.full(len(at), -1, np.int16), np.zeros((len(at), 3), np.uint8)
+        cloud = PointCloud(drawn.origin, drawn.vertices[at], black, nobody)
+        samples = OrientedCloud(cloud, vertex_normals(drawn)[at], np.empty((0, 3)))
+        mesh = poisson.poisson(samples, poisson.Settings(cell_m))
+        self._faces, self._normals = mesh.faces, vertex_normals(mesh).astype(np.float32)
+        self._scene = ray_scene(mesh.vertices, mesh.faces)
+
+    def distance(self, places: Float32) -> Float32:
+        """(n,) metres that each of (n, 3) places lies in front of the nearest face."""
+        if not len(places):
+            return np.empty(0, np.float32)
+        near = self._scene.compute_closest_points(places)
+        u, v = near["primitive_uvs"].numpy().T[:, :, None]
+        normal = self._normals[self._faces[near["primitive_ids"].numpy()]]
+        normal = (1 - u - v) * normal[:, 0] + u * normal[:, 1] + v * normal[:, 2]
+        offset = places - near["points"].numpy()
+        away = np.linalg.norm(offset, axis=1)
+        return np.asarray(np.copysign(away, np.einsum("ij,ij->i", offset, normal)), np.float32)
 
 
 def _free(oriented: OrientedCloud, noise_m: float) -> FreeSpace | None:
