@@ -51,6 +51,17 @@ def test_edges_are_sharper_than_the_solve_draws_them() -> None:
     assert off(found) < 0.5 * off(alone)
 
 
+@pytest.mark.parametrize("stations", [np.empty((0, 3)), np.full((1, 3), 0.5)], ids=["nobody", "one"])
+def test_a_scene_without_an_end_ends_a_fifth_beyond_its_points(stations: np.ndarray) -> None:
+    corner = box_corner(50)
+    who = np.full(len(corner.cloud.points), len(stations) - 1, np.int16)
+    seen = OrientedCloud(replace(corner.cloud, station=who), corner.normals, stations)
+    found = auto.auto(seen, SETTINGS).mesh
+    assert runs_one_way(found)
+    assert found.vertices.max() < 1.3
+    assert found.vertices.min() > -0.3
+
+
 def test_points_too_far_apart_are_left_to_the_solve() -> None:
     sparse = replace(SETTINGS.distance, spacing_m=0.001, cell_m=0.02, reach=0.5)
     found = auto.auto(sphere(2_000), replace(SETTINGS, distance=sparse))

@@ -29,7 +29,8 @@ _DEEPEST = np.float32(3)
 """Cells off the surface up to which a distance is told where another surface is cut back: told
 farther, it would jump from deep behind that to in front of the cut, and leave it open."""
 _MARGIN = 0.2
-"""How far the grid goes on around the points, in their extent: a surface that closes gaps may."""
+"""How far the grid goes on around the points, in their extent: a surface that closes gaps may. Of
+a scene that is open itself, a wall alone, it would go on without end."""
 
 
 class Field:
@@ -67,7 +68,8 @@ class Field:
         self.cell_m = np.float32(cell_m)
         low, high = extent(planes.points)
         extent_m = np.float32((high - low).max())
-        self.low = low - self._reach_m.max() - 2 * self.cell_m - np.float32(_MARGIN) * extent_m
+        margin_m = self._reach_m.max() + 2 * self.cell_m + np.float32(_MARGIN) * extent_m
+        self.low, self._high = low - margin_m, high + margin_m
         self.seeds = self.cells(planes.points)
 
     def places(self, key: Keys) -> Float32:
@@ -86,7 +88,8 @@ class Field:
         return self._carved(places, distance, far)
 
     def carried_on(self, key: Keys, beyond: Beyond) -> Float32:
-        """The same, fading into the distance to another surface where it becomes unknown."""
+        """The same, fading into the distance to another surface where it becomes unknown; NaN
+        beyond the grid."""
         places = self.places(key)
         distance, far, _ = self._at(places, False)
         trust = np.clip((1 - far) / np.float32(_FADE), 0, 1)
@@ -94,6 +97,7 @@ class Field:
         most_m = _DEEPEST * self.cell_m
         theirs = np.clip(beyond.distance(places[rest]), -most_m, most_m)
         distance[rest] = trust[rest] * distance[rest] + (1 - trust[rest]) * theirs
+        distance[((places < self.low) | (places > self._high)).any(axis=1)] = np.nan
         return self._carved(places, distance, far)
 
     def _carved(self, places: Float32, distance: Float32, far: Float32) -> Float32:
