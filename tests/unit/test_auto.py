@@ -51,7 +51,9 @@ def test_edges_are_sharper_than_the_solve_draws_them() -> None:
     assert off(found) < 0.5 * off(alone)
 
 
-@pytest.mark.parametrize("stations", [np.empty((0, 3)), np.full((1, 3), 0.5)], ids=["nobody", "one"])
+@pytest.mark.parametrize(
+    "stations", [np.empty((0, 3)), np.full((1, 3), 0.5)], ids=["nobody", "one"]
+)
 def test_a_scene_without_an_end_ends_a_fifth_beyond_its_points(stations: np.ndarray) -> None:
     corner = box_corner(50)
     who = np.full(len(corner.cloud.points), len(stations) - 1, np.int16)
