@@ -22,7 +22,11 @@ for (const name of decoderFiles) await copyFile(join(decoder, name), join(dist, 
 await copyFile(join(here, "src/icon.svg"), join(dist, "icon.svg"));
 
 const { metafile } = await build({
-  entryPoints: { viewer: join(here, "src/main.ts"), style: join(here, "src/page/style.css") },
+  entryPoints: {
+    viewer: join(here, "src/main.ts"),
+    style: join(here, "src/page/style.css"),
+    kiosk: join(here, "src/kiosk/kiosk.css"),
+  },
   outdir: dist,
   entryNames: "[name]-[hash]",
   chunkNames: "[name]-[hash]",
@@ -34,6 +38,20 @@ const { metafile } = await build({
   define: { DRACO_FOLDER: JSON.stringify(draco) },
   legalComments: "none",
   metafile: true,
+  absWorkingDir: here,
+  logLevel: "warning",
+});
+
+// The service worker keeps its name and its place: at the site's root, told the site's files.
+await build({
+  entryPoints: { sw: join(here, "src/along/worker.ts") },
+  outdir: dist,
+  bundle: true,
+  minify: true,
+  format: "iife",
+  target: ["es2022"],
+  define: { "process.env.NODE_ENV": JSON.stringify("production") },
+  legalComments: "none",
   absWorkingDir: here,
   logLevel: "warning",
 });
@@ -66,6 +84,7 @@ const manifest = {
   script: nameOf("src/main.ts"),
   soon: soonAfter("src/visit.ts"),
   style: nameOf("src/page/style.css"),
+  kiosk: nameOf("src/kiosk/kiosk.css"),
   draco,
   icon: "icon.svg",
 };

@@ -149,9 +149,10 @@ class Visitor:
 def visitor(
     browser: Browser, origin: str, *, size: tuple[int, int] = (640, 400), **context: Any
 ) -> Visitor:
-    """A visitor with a browser profile of its own."""
+    """A visitor with a browser profile of its own, who takes no tour along unless a test says so."""
     view = {"width": size[0], "height": size[1]}
-    return Visitor(browser.new_context(viewport=view, **context).new_page(), origin)
+    settings = {"service_workers": "block", **context}
+    return Visitor(browser.new_context(viewport=view, **settings).new_page(), origin)
 
 
 def rays(

@@ -73,6 +73,7 @@ def _parser() -> argparse.ArgumentParser:
     plan = add("plan", _plan, "Say what a build would do, and why.", "DIR")
     build = add("build", _build, "Build the tour's website.", "DIR")
     serve = add("serve", _serve, "Serve a tour on this machine.", "DIR-or-SITE")
+    kiosk = add("kiosk", _kiosk, "Show a tour on a screen that nobody attends.", "DIR-or-SITE")
     add("clean", _clean, "Drop the cache of a tour.", "DIR")
     doctor = add("doctor", _doctor, "Say what this machine lacks, and how to mend it.", "")
     build.add_argument(
@@ -94,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
         help="write where the time of what runs goes, a flame graph in HTML",
     )
     serve.add_argument("--port", type=_positive, default=8000, help="port (8000)")
+    kiosk.add_argument("--port", type=_positive, default=8710, help="port (8710)")
     for command in (check, plan, build, doctor):
         command.add_argument("--json", action="store_true", help="print JSON")
     return parser
@@ -210,16 +212,30 @@ def _built(asked: argparse.Namespace, out: str) -> Any:
 
 def _serve(asked: argparse.Namespace) -> int:
     from tourgen.serve import serve
-    from tourgen.site import is_site
 
-    site = asked.folder if is_site(asked.folder) else asked.folder / OUTPUT
+    serve(_site(asked.folder), "127.0.0.1", asked.port)
+    return 0
+
+
+def _kiosk(asked: argparse.Namespace) -> int:
+    from tourgen.kiosk import run_kiosk
+
+    run_kiosk(_site(asked.folder), asked.port)
+    return 0
+
+
+def _site(folder: Path) -> Path:
+    """The site in a folder, or the folder itself where it is one."""
+    from tourgen.site import is_site, restore_site
+
+    site = folder if is_site(folder) else folder / OUTPUT
+    restore_site(site)
     if not is_site(site):
         raise InputError(
-            f"`{asked.folder}`: expected a tour's site, found none",
-            f"build it first: tourgen build {asked.folder}",
+            f"`{folder}`: expected a tour's site, found none",
+            f"build it first: tourgen build {folder}",
         )
-    serve(site, "127.0.0.1", asked.port)
-    return 0
+    return site
 
 
 def _clean(asked: argparse.Namespace) -> int:

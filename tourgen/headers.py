@@ -19,6 +19,7 @@ _POLICY: Final[Mapping[str, str]] = {
     "media-src": "'self'",
     "style-src": "'self'",
     "font-src": "'self'",
+    "manifest-src": "'self'",
     "base-uri": "'none'",
     "form-action": "'none'",
     "frame-ancestors": "*",

@@ -60,13 +60,19 @@ class TourServer(ThreadingMixIn, http.server.HTTPServer):
         return f"http://{f'[{name}]' if ':' in name else name}:{port}/"
 
 
-def open_server(folder: Path, host: str = "127.0.0.1", port: int = 8000) -> TourServer:
+def open_server(
+    folder: Path,
+    host: str = "127.0.0.1",
+    port: int = 8000,
+    handler: Callable[..., TourHandler] | None = None,
+) -> TourServer:
     """Bind a server for a published tour; the caller lets it run and closes it.
 
     Args:
         folder: The site's folder.
         host: Address to listen on.
         port: Where to listen; the next free one above it where it is taken, 0 for any.
+        handler: What answers, given ``directory``; ``TourHandler`` if left out.
 
     Raises:
         InputError: ``folder`` holds no tour.
@@ -78,10 +84,10 @@ def open_server(folder: Path, host: str = "127.0.0.1", port: int = 8000) -> Tour
             f"`{folder}`: expected a tour, found no tour.json",
             "build it first with `tourgen build`",
         )
-    handler = partial(_Handler, directory=str(folder))
+    answer = partial(handler or TourHandler, directory=str(folder))
     for candidate in range(port, min(port + PORTS_TRIED, 65536)) if port else (0,):
         try:
-            return TourServer((host, candidate), handler)
+            return TourServer((host, candidate), answer)
         except OSError as error:
             refused = error
     raise StageError(
@@ -114,7 +120,9 @@ def serve(
             return
 
 
-class _Handler(http.server.SimpleHTTPRequestHandler):
+class TourHandler(http.server.SimpleHTTPRequestHandler):
+    """Answers for one folder."""
+
     protocol_version = "HTTP/1.1"
     server_version = "tourgen"
     sys_version = ""
@@ -125,6 +133,7 @@ class _Handler(http.server.SimpleHTTPRequestHandler):
         return _TYPES.get(suffix) or mimetypes.types_map.get(suffix, "application/octet-stream")
 
     def end_headers(self) -> None:
+        """With the headers that every file of a tour is sent with."""
         for key, value in SECURITY_HEADERS.items():
             self.send_header(key, value)
         forever = self.path.startswith("/viewer/")
@@ -156,6 +165,7 @@ class _Handler(http.server.SimpleHTTPRequestHandler):
         return BytesIO(part)
 
     def send_response(self, code: int, message: str | None = None) -> None:
+        """Say that parts may be asked for."""
         super().send_response(code, message)
         if code in (HTTPStatus.OK, HTTPStatus.PARTIAL_CONTENT):
             self.send_header("Accept-Ranges", "bytes")

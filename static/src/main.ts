@@ -1,6 +1,8 @@
 /** The viewer's entry: reads what the page says, opens its room, or shows the plain page. */
 
+import { takeAlongInTime } from "./along/along.ts";
 import { element } from "./dom.ts";
+import { kioskSettings } from "./kiosk/settings.ts";
 import { fetchTour, roomCalled, startOf } from "./tour.ts";
 import { chooseLanguage, wordsIn } from "./words.ts";
 
@@ -27,8 +29,16 @@ async function main(): Promise<void> {
   await quiet(host);
   const decoder = new URL(DRACO_FOLDER, import.meta.url);
   const asked = roomCalled(tour, host.dataset["room"] ?? null);
+  const room = asked ?? startOf(tour);
+  const told = host.dataset["kiosk"];
+  if (told !== undefined) {
+    const { openKiosk } = await import("./kiosk/open.ts");
+    return openKiosk(host, site, decoder, tour, room, kioskSettings(told));
+  }
   const { Visit } = await import("./visit.ts");
-  new Visit(host, site, decoder, tour, asked ?? startOf(tour)).start(asked === null);
+  const manner = { kiosk: false, opened: () => undefined, home: () => undefined };
+  new Visit(host, site, decoder, tour, room, manner).start(asked === null);
+  takeAlongInTime(site, tour);
 }
 
 /** The page's address will change with the rooms; what it names relatively must not. */

@@ -1,12 +1,14 @@
 /** What one does beside seeing: measure, cut open, tint, search, take a picture, pass it on. */
 
 import type { Raycaster } from "three";
+import { bytesOf, canTakeAlong, takeAlong } from "./along/along.ts";
 import type { Frontend } from "./page/frontend.ts";
 import type { Tool } from "./page/sheets.ts";
 import type { Rooms } from "./rooms.ts";
 import type { Stage } from "./scene/stage.ts";
 import { setTint } from "./scene/tint.ts";
 import type { Note, Room, Tour } from "./tour.ts";
+import { mannerOf } from "./words.ts";
 import type { Measure } from "./modes/measure.ts";
 
 export interface ToolsHost {
@@ -14,6 +16,9 @@ export interface ToolsHost {
   readonly stage: Stage;
   readonly front: Frontend;
   readonly rooms: Rooms;
+  /** Where nothing is saved, sent or worn. */
+  readonly kiosk: boolean;
+  readonly site: URL;
   /** Of the present view. */
   address(): string;
   /** Shows the room in a headset. */
@@ -69,9 +74,21 @@ export class Tools {
       },
       { name: words.section, drawing: "section", isOn: this.#isCut, act: () => void this.#cut() },
       { name: words.tint, drawing: "tint", isOn: this.#isTinted, act: () => this.#toggleTint() },
+    ];
+    if (this.#host.kiosk) return tools;
+    tools.push(
       { name: words.picture, drawing: "camera", act: () => this.#takePicture() },
       { name: words.share, drawing: "share", act: () => void this.#share() },
-    ];
+    );
+    if (canTakeAlong()) {
+      const size = new Intl.NumberFormat(mannerOf(this.#host.front.language), {
+        style: "unit",
+        unit: "megabyte",
+        maximumFractionDigits: 0,
+      }).format(bytesOf(this.#host.tour) / 1e6);
+      const name = `${words.takeAlong} (${size})`;
+      tools.push({ name, drawing: "along", act: () => void this.#takeAlong() });
+    }
     if (this.#canImmerse) {
       const act = (): void => {
         this.#host.front.panel.close();
@@ -83,6 +100,12 @@ export class Tools {
       tools.push({ name: words.full, drawing: "full", act: () => void this.#fillScreen() });
     }
     return tools;
+  }
+
+  /** Leaves everything as a visitor finds it. */
+  reset(): void {
+    this.end();
+    if (this.#isTinted) this.#toggleTint();
   }
 
   /** Takes away what belongs to the room that is left. */
@@ -200,6 +223,24 @@ export class Tools {
     const { front } = this.#host;
     const { shareSheet } = await import("./modes/share.ts");
     front.panel.open(front.words.share, shareSheet(front.title, this.#host.address(), front.words));
+  }
+
+  async #takeAlong(): Promise<void> {
+    const { front, site } = this.#host;
+    const { words } = front;
+    front.panel.close();
+    const share = new Intl.NumberFormat(mannerOf(front.language), { style: "percent" });
+    const close = [{ label: words.close, act: (): void => undefined }];
+    const progress = (part: number): void =>
+      front.notice.tell(words.takingAlong.replace("{}", share.format(part)), []);
+    try {
+      progress(0);
+      await takeAlong(site, progress);
+      front.notice.tell(words.along, close);
+    } catch (error) {
+      console.warn(error);
+      front.notice.tell(words.notAlong, close);
+    }
   }
 
   async #fillScreen(): Promise<void> {

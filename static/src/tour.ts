@@ -56,6 +56,8 @@ export interface Made {
   /** How far points lie from the surface: half of them, and 95 %, at most. */
   readonly deviation_mm: readonly [number, number];
   readonly inferred_ratio: number;
+  /** Of all its files. */
+  readonly bytes: number;
 }
 
 export interface Room {

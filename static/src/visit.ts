@@ -45,14 +45,26 @@ const REST_MS = 400;
 /** An address may name a place so far outside of a room. */
 const OUTSIDE_M = 3;
 const EYE_M = 1.6;
+/** Part of the usual speed at which a tour shows itself. */
+const UNHURRIED = 0.6;
 /** A gamepad's button opens what hangs within so much of the middle of the picture. */
 const AIM_PX = 130;
 
+/** How a visit is held: on a page of its own, or at a kiosk, where nothing outlasts it. */
+export interface Manner {
+  readonly kiosk: boolean;
+  /** Told of each room that opens. */
+  opened(room: Room): void;
+  /** Back to the start was chosen. */
+  home(): void;
+}
+
 export class Visit {
+  readonly front: Frontend;
+  readonly #manner: Manner;
   readonly #site: URL;
   readonly #tour: Tour;
   readonly #stage: Stage;
-  readonly #front: Frontend;
   readonly #query = readQuery(location.search);
   readonly #marker = new Marker();
   readonly #keyboard: Keyboard;
@@ -72,16 +84,24 @@ export class Visit {
   #then: (() => void) | null = null;
   #rest: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(host: HTMLElement, site: URL, decoder: URL, tour: Tour, room: Room) {
+  constructor(
+    host: HTMLElement,
+    site: URL,
+    decoder: URL,
+    tour: Tour,
+    room: Room,
+    manner: Manner,
+  ) {
     this.#site = site;
     this.#tour = tour;
+    this.#manner = manner;
     const wishes = [
       new URLSearchParams(location.search).get("lang"),
       chosenLanguage(),
       ...navigator.languages,
     ];
-    const language = chooseLanguage(tour.languages, wishes);
-    this.#front = new Frontend(host, site, tour, room, language, {
+    const language = manner.kiosk ? firstOf(tour) : chooseLanguage(tour.languages, wishes);
+    this.front = new Frontend(host, site, tour, room, language, manner.kiosk, {
       door: (link) => this.#walkThrough(link),
       reached: (at) => this.#act(() => this.#visitor.face(new Vector3(...at))),
       chosen: (next) => this.#go(next, next.entry),
@@ -92,8 +112,9 @@ export class Visit {
       search: () => void this.#tools.search(),
       tools: () => this.#tools.list(),
       language: (tag) => this.#speak(tag),
+      home: () => manner.home(),
     });
-    const canvas = this.#front.canvas;
+    const canvas = this.front.canvas;
     this.#stage = new Stage(canvas, this.#query.background, (dt) => this.#frame(dt));
     this.#stage.scene.add(this.#marker.group);
     const manager: LoadingManager = tileDecoder(decoder);
@@ -102,7 +123,7 @@ export class Visit {
       tour,
       room,
       this.#stage,
-      this.#front,
+      this.front,
       manager,
       this.#query.levels,
       {
@@ -118,6 +139,7 @@ export class Visit {
           const then = this.#then;
           this.#then = null;
           then?.();
+          manner.opened(of);
         },
         wanted: (next, view) => this.#go(next, view),
       },
@@ -125,8 +147,8 @@ export class Visit {
     this.#keyboard = new Keyboard(window, () => this.#act(() => this.#takeOver()));
     this.#gamepads = new Gamepads(
       {
-        act: () => this.#front.spots.nearest(AIM_PX)?.click(),
-        back: () => this.#front.panel.close(),
+        act: () => this.front.spots.nearest(AIM_PX)?.click(),
+        back: () => this.front.panel.close(),
         previous: () => this.#guide?.go(this.#guide.at - 1),
         next: () => this.#guide?.go(this.#guide.at + 1),
       },
@@ -139,17 +161,19 @@ export class Visit {
     this.#tools = new Tools({
       tour,
       stage: this.#stage,
-      front: this.#front,
+      front: this.front,
       rooms: this.#rooms,
+      kiosk: manner.kiosk,
+      site,
       address: () => this.#address(),
       immerse: () => void this.#immerse(),
       open: (of, note) => (note ? this.#open(of, note, true) : this.#go(of, of.entry)),
     });
     this.#pointer = this.#listen(canvas);
     canvas.addEventListener("webglcontextlost", () =>
-      this.#front.notice.tell(this.#front.words.contextLost, []),
+      this.front.notice.tell(this.front.words.contextLost, []),
     );
-    canvas.addEventListener("webglcontextrestored", () => this.#front.notice.clear());
+    canvas.addEventListener("webglcontextrestored", () => this.front.notice.clear());
     window.addEventListener("popstate", () => this.#follow());
     window.tourgen = this.#diagnostics();
   }
@@ -157,11 +181,60 @@ export class Visit {
   /** Opens the first room, as the address says. */
   start(isMissing: boolean): void {
     const place = placeIn(location.hash);
-    this.#front.mark("walk");
+    this.front.mark("walk");
     this.#then = () => {
-      if (isMissing || location.hash === "#missing") this.#tell(this.#front.words.noPage);
+      if (isMissing || location.hash === "#missing") this.#tell(this.front.words.noPage);
     };
     this.#enter(this.#rooms.room, place, false);
+  }
+
+  // ------------------------------------------------------------------ at a kiosk
+
+  /** Shows the tour by itself, without end. */
+  attract(): void {
+    this.#clear();
+    void this.#lead(true);
+  }
+
+  /** Begins as a visitor finds it, at the start, in a language. */
+  begin(language: string): void {
+    this.#clear();
+    this.front.speak(language);
+    const start = startOf(this.#tour);
+    if (start !== this.#rooms.room || !this.#rooms.isOpen) this.#go(start, start.entry);
+    else {
+      this.#visitor.jump(start.entry);
+      this.#aim();
+      this.#manner.opened(start);
+    }
+  }
+
+  /** Stands still. */
+  rest(): void {
+    this.#clear();
+  }
+
+  /** Whether a visitor listens or looks on without touching anything. */
+  get isBusy(): boolean {
+    const attracts = this.#guide?.attracts ?? false;
+    return (!attracts && (this.#guide?.isPlaying ?? false)) || this.front.panel.isSounding;
+  }
+
+  /** Whether the room that was asked for did not come. */
+  get hasFailed(): boolean {
+    return this.#rooms.hasFailed;
+  }
+
+  /** Takes away whatever a visitor has left. */
+  #clear(): void {
+    this.#endGuide();
+    this.#takeOver();
+    this.#leaveWay();
+    this.#tools.reset();
+    this.front.panel.close();
+    this.front.notice.clear();
+    this.front.speak(firstOf(this.#tour));
+    this.#stage.widen();
   }
 
   // ------------------------------------------------------------------ rooms
@@ -174,7 +247,7 @@ export class Visit {
     const before = this.#then;
     this.#then = () => {
       before?.();
-      if (wrong) this.#tell(this.#front.words.noView);
+      if (wrong) this.#tell(this.front.words.noView);
       const note = place.note === null ? undefined : room.notes[place.note - 1];
       if (note) this.#open(room, note, place.view === null);
       if (place.way !== "walk") void this.#see(place.way);
@@ -198,7 +271,9 @@ export class Visit {
   /** To another room's page, by its address. */
   #go(room: Room, view: View, then: (() => void) | null = null): void {
     this.#noteView();
-    history.pushState(null, "", roomAddress(this.#site, room.id, location.search));
+    if (!this.#manner.kiosk) {
+      history.pushState(null, "", roomAddress(this.#site, room.id, location.search));
+    }
     this.#leaveWay();
     this.#then = then;
     void this.#rooms.enter(room, view, true);
@@ -221,7 +296,7 @@ export class Visit {
   /** Writes into the address how one sees, and from where. */
   #noteView(): void {
     clearTimeout(this.#rest);
-    if (!this.#rooms.isOpen) return;
+    if (!this.#rooms.isOpen || this.#manner.kiosk) return;
     const hash = hashOf(this.#place());
     if (`#${hash}` !== location.hash) history.replaceState(history.state, "", `#${hash}`);
   }
@@ -236,7 +311,7 @@ export class Visit {
   }
 
   #tell(message: string): void {
-    this.#front.notice.tell(message, [{ label: this.#front.words.close, act: () => undefined }]);
+    this.front.notice.tell(message, [{ label: this.front.words.close, act: () => undefined }]);
   }
 
   // ------------------------------------------------------------------ ways to see
@@ -262,17 +337,17 @@ export class Visit {
           tour: this.#tour,
           stage: this.#stage,
           rooms: this.#rooms,
-          titleOf: (each) => this.#front.text(each.title),
+          titleOf: (each) => this.front.text(each.title),
           wish: () => this.#gamepads.wish() ?? this.#keyboard.wish(),
           enter: (into, view) => void this.#descend(into, view),
         },
         way === "dollhouse",
       );
-      this.#front.showSigns(this.#overview.signs());
+      this.front.showSigns(this.#overview.signs());
     }
     this.#way = way;
-    this.#front.mark(way);
-    this.#front.hideHint();
+    this.front.mark(way);
+    this.front.hideHint();
     this.#stage.draw();
     this.#noteView();
   }
@@ -289,11 +364,11 @@ export class Visit {
   }
 
   #showPlan(): void {
-    const titleOf = (room: Room): string => this.#front.text(room.title);
-    this.#sheet = new PlanSheet(this.#tour, this.#front.words, titleOf, {
+    const titleOf = (room: Room): string => this.front.text(room.title);
+    this.#sheet = new PlanSheet(this.#tour, this.front.words, titleOf, {
       chosen: (room, at) => this.#goOnPlan(room, at),
     });
-    this.#front.overlay.append(this.#sheet.element);
+    this.front.overlay.append(this.#sheet.element);
     this.#sheet.stand(this.#rooms.room, this.#visitor.eye, this.#visitor.look.yaw);
   }
 
@@ -314,11 +389,11 @@ export class Visit {
     if (this.#overview) {
       this.#overview.leave();
       this.#overview = null;
-      this.#front.showSigns();
+      this.front.showSigns();
     }
     this.#tools.end();
     this.#way = "walk";
-    this.#front.mark("walk");
+    this.front.mark("walk");
     this.#marker.hide();
   }
 
@@ -334,7 +409,7 @@ export class Visit {
       });
       this.#aim();
     }
-    this.#front.openNote(note);
+    this.front.openNote(note);
     this.#note = note;
     this.#noteView();
   }
@@ -345,27 +420,29 @@ export class Visit {
     this.#noteView();
   }
 
-  async #lead(): Promise<void> {
+  /** @param attracts By itself, until somebody comes. */
+  async #lead(attracts = false): Promise<void> {
     if (this.#guide) return this.#guide.toggle();
     const { Guide } = await import("./modes/guide.ts");
     if (this.#guide) return;
     if (this.#way !== "walk") this.#leaveWay();
     this.#guide = new Guide(
       {
+        attracts,
         stops: this.#tour.stops,
         leadTo: (stop) => this.#leadTo(stop),
         hasArrived: () => this.#rooms.isOpen && !this.#visitor.isUnderWay,
         woken: () => this.#stage.wake(),
         closed: () => this.#endGuide(),
       },
-      this.#front.words,
-      (stop) => this.#front.text(stop.text),
+      this.front.words,
+      (stop) => this.front.text(stop.text),
     );
-    this.#front.overlay.append(this.#guide.element);
-    this.#front.panel.close();
-    this.#front.hideHint();
+    if (!attracts) this.front.overlay.append(this.#guide.element);
+    this.front.panel.close();
+    this.front.hideHint();
     const here = this.#tour.stops.findIndex(({ room }) => room === this.#rooms.room.id);
-    this.#guide.go(Math.max(0, here));
+    this.#guide.go(attracts ? 0 : Math.max(0, here));
   }
 
   #leadTo(stop: Stop): void {
@@ -374,7 +451,8 @@ export class Visit {
     if (room !== this.#rooms.room) this.#go(room, stop);
     else if (this.#rooms.isOpen) {
       this.#leaveWay();
-      if (prefersStillness() || !this.#visitor.glide(stop)) this.#visitor.jump(stop);
+      const pace = this.#guide?.attracts ? UNHURRIED : 1;
+      if (prefersStillness() || !this.#visitor.glide(stop, pace)) this.#visitor.jump(stop);
       this.#aim();
     }
     this.#stage.wake();
@@ -404,7 +482,7 @@ export class Visit {
         {
           stage: this.#stage,
           rooms: this.#rooms,
-          text: (texts) => this.#front.text(texts),
+          text: (texts) => this.front.text(texts),
           step: () => this.#rooms.tiles?.update(this.#stage.camera, this.#stage.size),
           pass: (link) => this.#pass(link),
           ended: (view) => {
@@ -418,7 +496,7 @@ export class Visit {
       );
     } catch (error) {
       console.warn(error);
-      this.#tell(this.#front.words.noVr);
+      this.#tell(this.front.words.noVr);
     }
   }
 
@@ -428,15 +506,19 @@ export class Visit {
   }
 
   #speak(language: string): void {
+    if (!this.#manner.kiosk) this.#keepLanguage(language);
+    this.#guide?.say(this.front.words, (stop) => this.front.text(stop.text));
+    this.#sheet?.say(this.front.words);
+    this.#tools.say();
+    if (this.#overview) this.front.showSigns(this.#overview.signs());
+    this.#stage.draw();
+  }
+
+  #keepLanguage(language: string): void {
     chooseLanguageForGood(language);
     const url = new URL(location.href);
     url.searchParams.set("lang", language);
     history.replaceState(history.state, "", url);
-    this.#guide?.say(this.#front.words, (stop) => this.#front.text(stop.text));
-    this.#sheet?.say(this.#front.words);
-    this.#tools.say();
-    if (this.#overview) this.#front.showSigns(this.#overview.signs());
-    this.#stage.draw();
   }
 
   // ------------------------------------------------------------------ the loop
@@ -475,7 +557,7 @@ export class Visit {
   /** Does something that may set the visitor moving. */
   #act(act: () => void): void {
     act();
-    this.#front.hideHint();
+    this.front.hideHint();
     this.#stage.wake();
   }
 
@@ -485,7 +567,7 @@ export class Visit {
     this.#stage.aim(this.#visitor.eye, this.#visitor.look);
     this.#rooms.tiles?.moved();
     this.#stage.draw();
-    this.#front.map.stand(this.#rooms.room, this.#visitor.eye, this.#visitor.look.yaw);
+    this.front.map.stand(this.#rooms.room, this.#visitor.eye, this.#visitor.look.yaw);
     clearTimeout(this.#rest);
     this.#rest = setTimeout(() => this.#noteView(), REST_MS);
   }
@@ -493,7 +575,7 @@ export class Visit {
   #placeSigns(): void {
     const { camera, size } = this.#stage;
     const outside = this.#overview !== null;
-    this.#front.spots.place(
+    this.front.spots.place(
       camera,
       size,
       (at) => !outside && (this.#rooms.collider?.blocks(camera.position, at, SIGN_SLACK_M) ?? false),
@@ -554,7 +636,7 @@ export class Visit {
     const idle = this.#pointer.dragging || this.#overview !== null || this.#tools.picks;
     const hit = idle ? null : this.#cast(this.#stage.caster(x, y));
     const floor = hit && isFloor(hit) ? hit : null;
-    this.#front.canvas.classList.toggle("on-floor", floor !== null);
+    this.front.canvas.classList.toggle("on-floor", floor !== null);
     if (floor) this.#marker.show(floor.point, floor.normal);
     if (floor || this.#marker.hide()) this.#stage.draw();
   }
@@ -611,6 +693,11 @@ export class Visit {
       },
     };
   }
+}
+
+/** The tour's first language. */
+function firstOf({ languages }: Tour): string {
+  return languages[0] ?? "en";
 }
 
 function isFloor(hit: Hit): boolean {

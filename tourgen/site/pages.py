@@ -34,10 +34,12 @@ class Pages:
         told: What tour.json says.
         theme: Its looks.
         viewer: The names of the viewer's files.
+        kiosk: What the kiosk's page is told.
     """
 
-    def __init__(self, folder: Path, told: Json, theme: Theme, viewer: Json) -> None:
+    def __init__(self, folder: Path, told: Json, theme: Theme, viewer: Json, kiosk: Json) -> None:
         self._folder, self._told, self._theme, self._viewer = folder, told, theme, viewer
+        self._kiosk = kiosk
         self._language: str = told["languages"][0]
 
     def every(self, report: Json) -> Iterator[tuple[str, str]]:
@@ -47,6 +49,7 @@ class Pages:
         for room in rooms:
             yield f"rooms/{room['id']}/index.html", self._room(room, site="../../", is_start=False)
         yield "index.html", self._room(start, site="", is_start=True)
+        yield "kiosk.html", self._page("kiosk.html", site="", room=start, kiosk=self._kiosk)
         yield "404.html", self._page("404.html", site=self._root or "../../")
         yield "report.html", self._page("report.html", site="", report=report)
         if self._told["address"]:

@@ -17,6 +17,8 @@ from tourgen.errors import InputError
 from tourgen.headers import headers_file
 from tourgen.site.built import BuiltRoom
 from tourgen.site.described import described, note_files
+from tourgen.site.kiosk import code_of, kiosk_settings
+from tourgen.site.offline import ICONS, MANIFEST, WORKER, icon, icon_path, manifest, worker_script
 from tourgen.site.pages import Pages, viewer_folder
 from tourgen.tour import Tour
 from tourgen.tour.theme import load_theme
@@ -102,7 +104,7 @@ def _remove(folder: Path) -> None:
 
 def _write_all(tour: Tour, built: Mapping[str, BuiltRoom], report: Json, out: Path) -> None:
     viewer = viewer_folder()
-    shutil.copytree(viewer, out / "viewer")
+    shutil.copytree(viewer, out / "viewer", ignore=shutil.ignore_patterns(WORKER))
     theme = load_theme(tour.folder)
     for name, content in theme.files.items():
         _write(out / name, content)
@@ -116,9 +118,17 @@ def _write_all(tour: Tour, built: Mapping[str, BuiltRoom], report: Json, out: Pa
             _write(folder / PurePosixPath(name), content)
         for name, file in note_files(tour, room):
             _write(out / name, file.read_bytes())
-    pages = Pages(tour.folder, told, theme, json.loads((viewer / "manifest.json").read_bytes()))
-    for name, page in pages.every(report):
+    kiosk = kiosk_settings(tour.kiosk, told)
+    for address, name in kiosk["codes"].items():
+        _write(out / name, code_of(address))
+    names = json.loads((viewer / "manifest.json").read_bytes())
+    for name, page in Pages(tour.folder, told, theme, names, kiosk).every(report):
         _write(out / name, page)
+    for size in ICONS:
+        _write(out / icon_path(size), icon(built[tour.start].files["poster.webp"], size))
+    _write(out / MANIFEST, manifest(told))
+    # Last, since it names all that is there.
+    _write(out / WORKER, worker_script(out, (viewer / WORKER).read_text("utf-8")))
 
 
 def _write_json(path: Path, content: Json) -> None:

@@ -116,6 +116,7 @@ def _tour(folder: Path, file: TourFile) -> Tour:
         address=file.tour.address,
         rooms=rooms,
         stops=file.stop,
+        kiosk=file.kiosk,
     )
 
 

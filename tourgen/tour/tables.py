@@ -28,11 +28,13 @@ from tourgen.tour.values import (
     Address,
     File,
     Form,
+    Hours,
     Languages,
     Moment,
     NeighbourRef,
     Number,
     OnlyWith,
+    Pin,
     Pose,
     Position,
     Radii,
@@ -439,6 +441,37 @@ class Stop(_Table):
     )
 
 
+class Kiosk(_Table):
+    """The tour at a screen that nobody attends."""
+
+    idle_s: Number = Field(
+        default=60.0,
+        ge=10,
+        le=3600,
+        description="After so long without a touch visitors are asked whether they are there.",
+    )
+    warning_s: Number = Field(
+        default=15.0,
+        ge=5,
+        le=120,
+        description="How long they are asked; then the tour returns to its start.",
+    )
+    controls: Literal["usual", "low"] = Field(
+        default="usual",
+        description='Where controls stand; "low": all in the lower half, for those who sit.',
+    )
+    hours: Hours | None = Field(
+        default=None,
+        description='When the screen is awake, as "10:00-18:00"; a day left out of the table is '
+        "closed, and hours may go beyond midnight. Left out: always.",
+    )
+    pin: Pin | None = Field(
+        default=None,
+        description="What opens the service corner: five touches in the upper left corner, then "
+        "these digits. Left out: there is no service corner.",
+    )
+
+
 class TourFile(_Table):
     """A tour file."""
 
@@ -448,6 +481,7 @@ class TourFile(_Table):
         default=(),
         description="The guided tour. Left out: every room's entry and notes.",
     )
+    kiosk: Kiosk = Field(default=Kiosk(), description="The tour at a screen that nobody attends.")
 
 
 class Tour(_Table):
@@ -464,6 +498,7 @@ class Tour(_Table):
         address: Where the tour will be published; ends with a slash.
         rooms: In the order of the file.
         stops: Of the guided tour, as given.
+        kiosk: How it is shown at a screen that nobody attends.
     """
 
     folder: Path
@@ -476,6 +511,7 @@ class Tour(_Table):
     address: str | None
     rooms: tuple[Room, ...]
     stops: tuple[Stop, ...]
+    kiosk: Kiosk
 
     def room(self, room_id: str) -> Room:
         """The room of that id.

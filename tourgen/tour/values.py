@@ -26,6 +26,10 @@ from tourgen.errors import TourgenError
 from tourgen.remote import fetch, is_remote, local
 
 _ROOM_ID: Final = re.compile(r"(?!(con|prn|aux|nul|com\d|lpt\d)$)[a-z0-9][a-z0-9_-]{0,63}")
+_PIN: Final = re.compile(r"[0-9]{4,8}")
+_TIME: Final = "([01][0-9]|2[0-3]):[0-5][0-9]"
+_SPAN: Final = re.compile(f"{_TIME}-({_TIME}|24:00)")
+DAYS: Final = ("mon", "tue", "wed", "thu", "fri", "sat", "sun")
 _LANGUAGE: Final = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{2,8})*")
 
 
@@ -242,6 +246,27 @@ def _check_address(value: str) -> str:
     return value if value.endswith("/") else f"{value}/"
 
 
+def _check_pin(value: str) -> str:
+    if not _PIN.fullmatch(value):
+        raise fault(f"expected four to eight digits, found {shown(value)}")
+    return value
+
+
+def _check_hours(value: object) -> dict[str, str]:
+    """A span for every day, or a table of spans by day; a day without one is closed."""
+    hours = dict.fromkeys(DAYS, value) if isinstance(value, str) else value
+    if not isinstance(hours, dict) or not hours:
+        raise fault(
+            f'expected hours such as "10:00-18:00", or a table by day, found {shown(value)}'
+        )
+    for day, span in hours.items():
+        if day not in DAYS:
+            raise fault(f"day `{day}` does not exist, {listed(DAYS)}", near(str(day), DAYS))
+        if not isinstance(span, str) or not _SPAN.fullmatch(span):
+            raise fault(f'expected hours such as "10:00-18:00", found {shown(span)}')
+    return hours
+
+
 @dataclass(frozen=True)
 class OnlyWith:
     """For a key that means something to some of the values of the `method` above it only."""
@@ -302,3 +327,7 @@ NeighbourRef = Annotated[str, AfterValidator(_check_neighbour), Form("`id` of a 
 Address = Annotated[str, AfterValidator(_check_address), Form("address")]
 Moment = Annotated[str, BeforeValidator(_check_moment), Form("date, or date and time")]
 Languages = Annotated[tuple[str, ...], AfterValidator(_check_languages)]
+Pin = Annotated[str, AfterValidator(_check_pin), Form("string of digits")]
+Hours = Annotated[
+    Mapping[str, str], BeforeValidator(_check_hours), Form("hours, or table by day, `mon` to `sun`")
+]

@@ -8,7 +8,12 @@ import type { Words } from "../words.ts";
 const LETTERS_S = 14;
 const STAY_S = [5, 30] as const;
 
+/** While it attracts, one stays so long at least. */
+const UNHURRIED_S = 9;
+
 export interface GuideHost {
+  /** It attracts: goes on without end, and takes its time. */
+  readonly attracts: boolean;
   readonly stops: readonly Stop[];
   /** Sets out for a stop. */
   leadTo(stop: Stop): void;
@@ -103,6 +108,10 @@ export class Guide {
     this.#show();
   }
 
+  get attracts(): boolean {
+    return this.#host.attracts;
+  }
+
   get isPlaying(): boolean {
     return this.#playing;
   }
@@ -114,7 +123,9 @@ export class Guide {
     this.#stayed += dt;
     this.#bar.style.transform = `scaleX(${Math.min(1, this.#stayed / this.#stay).toFixed(3)})`;
     if (this.#stayed < this.#stay) return true;
-    if (this.#at < this.#host.stops.length - 1) this.go(this.#at + 1);
+    const { stops, attracts } = this.#host;
+    if (this.#at < stops.length - 1) this.go(this.#at + 1);
+    else if (attracts) this.go(0);
     else this.pause();
     return this.#playing;
   }
@@ -122,6 +133,7 @@ export class Guide {
   get #stay(): number {
     const stop = this.#host.stops[this.#at];
     if (!stop) return STAY_S[0];
+    if (this.#host.attracts) return stop.seconds ?? UNHURRIED_S;
     const reading = this.#textOf(stop).length / LETTERS_S + 2;
     return stop.seconds ?? Math.min(STAY_S[1], Math.max(STAY_S[0], reading));
   }

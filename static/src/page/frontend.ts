@@ -28,6 +28,8 @@ export interface FrontendEvents extends SignEvents {
   tools(): readonly Tool[];
   /** Another language was chosen; everything here speaks it already. */
   language(tag: string): void;
+  /** Back to the start, at a kiosk. */
+  home(): void;
 }
 
 export class Frontend {
@@ -57,6 +59,7 @@ export class Frontend {
     tour: Tour,
     room: Room,
     language: string,
+    kiosk: boolean,
     events: FrontendEvents,
   ) {
     this.#host = host;
@@ -70,12 +73,13 @@ export class Frontend {
     this.panel = new Panel(() => events.closed());
     this.map = new MiniMap(tour, () => events.see("plan"));
     const logo = tour.logo === null ? null : new URL(tour.logo, site).href;
-    this.#header = new Header(logo, tour.languages, {
+    this.#header = new Header(logo, tour.languages, kiosk, {
       search: () => events.search(),
       rooms: () => this.#listRooms(),
       about: () => this.#tellAbout(),
       tools: () => this.openTools(),
-      language: (tag) => this.#speak(tag),
+      language: (tag) => this.speak(tag),
+      home: () => events.home(),
     });
     this.#dock = new Dock({ guide: () => events.guide(), see: (way) => events.see(way) });
     host.replaceChildren(
@@ -210,7 +214,8 @@ export class Frontend {
     this.panel.open(this.#words.rooms, roomsSheet(items));
   }
 
-  #speak(language: string): void {
+  /** Speaks another language. */
+  speak(language: string): void {
     this.#language = language;
     this.#words = wordsIn(language);
     this.panel.close();

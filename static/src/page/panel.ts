@@ -31,6 +31,11 @@ export class Panel {
     return !this.element.hidden;
   }
 
+  /** Whether a sound plays in it. */
+  get isSounding(): boolean {
+    return [...this.#body.querySelectorAll("audio")].some((sound) => !sound.paused);
+  }
+
   setWords(close: string): void {
     this.#close.setAttribute("aria-label", close);
   }

@@ -101,6 +101,12 @@ export class Stage {
     this.#fit();
   }
 
+  /** Takes the zoom back. */
+  widen(): void {
+    this.#zoom = 1;
+    this.#fit();
+  }
+
   aim(eye: Vector3, look: Look): void {
     this.camera.position.copy(eye);
     this.camera.lookAt(look.direction().add(eye));

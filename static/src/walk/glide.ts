@@ -2,7 +2,7 @@
 
 import { CatmullRomCurve3, Vector3 } from "three";
 
-const SPEED_M_S = 1.15;
+export const SPEED_M_S = 1.15;
 const LEAST_S = 1.6;
 /** On ways shorter than this nobody looks ahead. */
 const STROLL_M = 1.5;
@@ -26,8 +26,9 @@ export class Glide {
    * @param path Places of the eye, the first where it is, metres.
    * @param ahead Where it looks, unit length.
    * @param target What it shall look at, metres.
+   * @param speed_m_s On the way.
    */
-  constructor(path: readonly Vector3[], ahead: Vector3, target: Vector3) {
+  constructor(path: readonly Vector3[], ahead: Vector3, target: Vector3, speed_m_s = SPEED_M_S) {
     const first = path[0] ?? target;
     const goal = path[path.length - 1] ?? first;
     this.#start = first.clone();
@@ -38,7 +39,7 @@ export class Glide {
     this.#path = apart.length > 1 ? new CatmullRomCurve3([...apart], false, "centripetal") : null;
     const length = this.#path?.getLength() ?? 0;
     this.#strolls = length > STROLL_M;
-    this.#seconds = Math.max(LEAST_S, length / SPEED_M_S);
+    this.#seconds = Math.max((LEAST_S * SPEED_M_S) / speed_m_s, length / speed_m_s);
     this.#look(0);
   }
 

@@ -4,7 +4,7 @@ import { Vector3 } from "three";
 import type { Collider } from "./collider.ts";
 import { prefersStillness } from "../dom.ts";
 import { Errand } from "./errand.ts";
-import { Glide } from "./glide.ts";
+import { Glide, SPEED_M_S } from "./glide.ts";
 import type { Wish } from "./keyboard.ts";
 import { Look } from "./look.ts";
 import { planRoute } from "./route.ts";
@@ -103,14 +103,16 @@ export class Visitor {
   /**
    * Goes to another place of the room as a camera does, eased, on foot or through the air.
    *
+   * @param pace Part of the usual speed.
    * @returns Whether there is a way; else one stays.
    */
-  glide(view: View): boolean {
+  glide(view: View, pace = 1): boolean {
     const goal = new Vector3(...view.position);
     const path = this.#pathTo(goal);
     if (!path) return false;
     this.stop();
-    this.#glide = new Glide(path, this.look.direction(), new Vector3(...view.look_at));
+    const target = new Vector3(...view.look_at);
+    this.#glide = new Glide(path, this.look.direction(), target, pace * SPEED_M_S);
     return true;
   }
 

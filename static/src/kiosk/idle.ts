@@ -1,0 +1,30 @@
+/** How long nobody has touched anything. */
+
+const SIGNS = ["pointerdown", "pointermove", "wheel", "keydown", "touchstart", "gamepadconnected"];
+
+export class Idle {
+  /** Of the clock that no change of date moves. */
+  #since = performance.now();
+
+  /** @param touched Told of each sign of somebody. */
+  constructor(target: Window, touched: () => void) {
+    for (const sign of SIGNS) {
+      target.addEventListener(
+        sign,
+        () => {
+          this.reset();
+          touched();
+        },
+        { capture: true, passive: true },
+      );
+    }
+  }
+
+  get seconds(): number {
+    return (performance.now() - this.#since) / 1000;
+  }
+
+  reset(): void {
+    this.#since = performance.now();
+  }
+}

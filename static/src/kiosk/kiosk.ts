@@ -1,0 +1,243 @@
+/**
+ * The kiosk: attracts while nobody is there, is somebody's visit from a touch on, asks after a while
+ * without one whether they are still there, and returns to its start as if they never were.
+ */
+
+import { hasNews, takeAlong, takeOver, canTakeAlong } from "../along/along.ts";
+import type { Frontend } from "../page/frontend.ts";
+import type { Room, Tour } from "../tour.ts";
+import type { Visit } from "../visit.ts";
+import { codeSheet } from "./code-sheet.ts";
+import { Faults } from "./faults.ts";
+import { isOpen } from "./hours.ts";
+import { Idle } from "./idle.ts";
+import { lock } from "./locks.ts";
+import type { KioskSettings } from "./settings.ts";
+import { StartScreen } from "./start-screen.ts";
+import { Visits } from "./visits.ts";
+import { Warning } from "./warning.ts";
+import { Watch } from "./watch.ts";
+
+type State = "attract" | "visit" | "warning" | "asleep";
+
+const TICK_MS = 250;
+/** What fails to come is asked for again, and a picture that stays lost is given up, after so long. */
+const PATIENCE_S = 6;
+const NEWS_S = 60;
+/** So many touches in the upper left corner, none of them later than that, open the service. */
+const CORNER_TOUCHES = 5;
+const CORNER_PX = 96;
+const CORNER_MS = 4000;
+
+export class Kiosk {
+  readonly #host: HTMLElement;
+  readonly #site: URL;
+  readonly #tour: Tour;
+  readonly #settings: KioskSettings;
+  readonly #visit: Visit;
+  readonly #front: Frontend;
+  readonly #start: StartScreen;
+  readonly #warning = new Warning(() => this.#goOn());
+  readonly #idle: Idle;
+  readonly #visits = new Visits();
+  readonly #faults = new Faults(window);
+  readonly #watch: Watch | null;
+  #state: State = "attract";
+  #corner: number[] = [];
+  #lostSince: number | null = null;
+  #failedSince: number | null = null;
+  #askedNews = performance.now();
+  #isReloading = false;
+
+  constructor(host: HTMLElement, site: URL, tour: Tour, settings: KioskSettings, visit: Visit) {
+    this.#host = host;
+    this.#site = site;
+    this.#tour = tour;
+    this.#settings = settings;
+    this.#visit = visit;
+    this.#front = visit.front;
+    this.#watch = Watch.isOn(location.search) ? new Watch(site) : null;
+    const logo = tour.logo === null ? null : new URL(tour.logo, site).href;
+    this.#start = new StartScreen(tour, logo, (language) => this.#begin(language));
+    host.append(this.#start.element, this.#warning.element);
+    host.classList.toggle("low", settings.low);
+    this.#idle = new Idle(window, () => this.#touched());
+    lock(window, (address) => this.#showCode(address));
+    window.addEventListener("pointerdown", (event) => this.#touchedAt(event), { capture: true });
+    this.#front.canvas.addEventListener("webglcontextlost", () => {
+      this.#faults.note("the graphics context was lost");
+      this.#lostSince = performance.now();
+    });
+    this.#front.canvas.addEventListener("webglcontextrestored", () => (this.#lostSince = null));
+  }
+
+  /** Begins to attract. */
+  run(): void {
+    setInterval(() => this.#tick(), TICK_MS);
+    this.#attract();
+    if (canTakeAlong()) {
+      void takeAlong(this.#site).catch((error: unknown) => this.#faults.note(String(error)));
+    }
+  }
+
+  /** Told of each room that opens. */
+  opened(room: Room): void {
+    this.#failedSince = null;
+    if (this.#state !== "visit") return;
+    this.#visits.count(room.id, this.#front.language, new Date());
+  }
+
+  /** Everything as if nobody had been here. */
+  home(): void {
+    this.#attract();
+  }
+
+  // ------------------------------------------------------------------ states
+
+  #enter(state: State): void {
+    this.#state = state;
+    this.#host.dataset["state"] = state;
+  }
+
+  #attract(): void {
+    this.#enter("attract");
+    this.#warning.hide();
+    this.#visit.attract();
+    this.#start.show();
+  }
+
+  #begin(language: string): void {
+    this.#idle.reset();
+    this.#enter("visit");
+    this.#start.hide();
+    this.#visit.begin(language);
+  }
+
+  #goOn(): void {
+    this.#idle.reset();
+    this.#warning.hide();
+    this.#enter("visit");
+    this.#front.canvas.focus({ preventScroll: true });
+  }
+
+  #sleep(): void {
+    this.#enter("asleep");
+    this.#visit.rest();
+    this.#start.hide();
+  }
+
+  /** Any sign of somebody. */
+  #touched(): void {
+    if (this.#state === "warning") this.#goOn();
+    if (this.#state === "asleep") this.#attract();
+  }
+
+  #tick(): void {
+    if (this.#isReloading) return;
+    const { idle_s, warning_s, hours } = this.#settings;
+    const idle = this.#idle.seconds;
+    this.#mend();
+    if (this.#visit.isBusy) this.#idle.reset();
+    if (this.#state === "visit" && idle > idle_s) {
+      this.#enter("warning");
+      this.#warning.show(this.#front.words);
+    }
+    if (this.#state === "warning") {
+      const left = idle_s + warning_s - idle;
+      if (left <= 0) this.#attract();
+      else this.#warning.tell(left, warning_s, this.#front.words);
+    }
+    if (this.#state !== "attract" && this.#state !== "asleep") return;
+    const closed = hours !== null && !isOpen(hours, new Date());
+    if (closed && this.#state === "attract" && idle > idle_s) this.#sleep();
+    if (!closed && this.#state === "asleep") this.#attract();
+    if (performance.now() - this.#askedNews > NEWS_S * 1000) void this.#update();
+  }
+
+  /** A new version is taken over when it is here whole, and while nobody is. */
+  async #update(): Promise<void> {
+    this.#askedNews = performance.now();
+    if (!canTakeAlong() || !(await hasNews(this.#site))) return;
+    if (this.#state !== "attract" && this.#state !== "asleep") return;
+    await takeOver(this.#site);
+    this.#reload();
+  }
+
+  /** What does not come back by itself is begun anew. */
+  #mend(): void {
+    const now = performance.now();
+    if (this.#lostSince !== null && now - this.#lostSince > PATIENCE_S * 1000) this.#reload();
+    if (!this.#visit.hasFailed) {
+      this.#failedSince = null;
+      return;
+    }
+    this.#failedSince ??= now;
+    if (this.#state === "visit" || now - this.#failedSince < PATIENCE_S * 1000) return;
+    this.#failedSince = now;
+    this.#visit.attract();
+  }
+
+  #reload(): void {
+    this.#isReloading = true;
+    location.reload();
+  }
+
+  // ------------------------------------------------------------------ codes and service
+
+  #showCode(address: string): void {
+    const path = this.#settings.codes[address];
+    const picture = path === undefined ? null : new URL(path, this.#site).href;
+    const { words, panel } = this.#front;
+    panel.open(words.kioskCode, ...codeSheet(address, picture, words));
+  }
+
+  #touchedAt(event: PointerEvent): void {
+    const now = performance.now();
+    if (event.clientX > CORNER_PX || event.clientY > CORNER_PX) {
+      this.#corner = [];
+      return;
+    }
+    if (this.#state === "visit") event.stopPropagation(); // nobody walks to the ceiling
+    this.#corner = [...this.#corner.filter((at) => now - at < CORNER_MS), now];
+    if (this.#corner.length < CORNER_TOUCHES || !this.#settings.pin) return;
+    this.#corner = [];
+    void this.#askPin();
+  }
+
+  async #askPin(): Promise<void> {
+    const { pin } = this.#settings;
+    const { pinPad } = await import("./service.ts");
+    if (!pin) return;
+    if (this.#state !== "visit") this.#begin(this.#front.language);
+    const { panel, words } = this.#front;
+    panel.open(words.service, pinPad(pin, words, () => void this.#openService()));
+  }
+
+  async #openService(): Promise<void> {
+    const { serviceSheet } = await import("./service.ts");
+    const { panel, words, language } = this.#front;
+    const watch = this.#watch;
+    const content = serviceSheet({
+      tour: this.#tour,
+      visits: this.#visits,
+      faults: this.#faults,
+      language,
+      words,
+      keep: (csv) => this.#keep(csv),
+      restart: () => this.#reload(),
+      end: watch ? () => void watch.post("end") : null,
+    });
+    panel.open(words.service, ...content);
+  }
+
+  async #keep(csv: string): Promise<string | null> {
+    const where = await this.#watch?.post("visits", csv);
+    if (where) return where;
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([csv], { type: "text/csv" }));
+    link.download = "visits.csv";
+    link.click();
+    URL.revokeObjectURL(link.href);
+    return null;
+  }
+}

@@ -1,0 +1,326 @@
+"""The kiosk: it attracts, lets somebody visit, and forgets them; there is no way out."""
+
+from __future__ import annotations
+
+import csv
+import random
+from collections.abc import Callable, Iterator
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page
+from published import rooms_of
+from visitor import Visit, Visitor
+
+from tourgen.site.kiosk import code_of
+
+SIZE = (960, 600)
+PIN = "1911"
+IDLE_S, WARNING_S = 60, 15
+Kiosk = Callable[..., Visitor]
+
+
+@pytest.fixture
+def kiosk(visit: Visit) -> Iterator[Kiosk]:
+    """Makes kiosks whose clock stands unless it is told to run."""
+
+    def make(size: tuple[int, int] = SIZE, at: datetime | None = None, **settings: Any) -> Visitor:
+        here = visit(size=size, reduced_motion="reduce", **settings)
+        here.page.clock.install(time=at or datetime(2026, 7, 6, 12))
+        here.page.goto(f"{here.origin}/kiosk.html?levels=root")
+        here.wait("window.tourgen?.ready")
+        return here
+
+    return make
+
+
+def state(page: Page) -> str:
+    return str(page.evaluate("document.getElementById('tour').dataset.state"))
+
+
+def begin(here: Visitor, language: str = "en") -> None:
+    here.page.locator(f".begin[lang={language}]").click()
+    here.wait("window.tourgen.ready")
+    assert state(here.page) == "visit"
+
+
+def leave_alone(here: Visitor, seconds: float) -> None:
+    here.page.clock.run_for(int(1000 * seconds))
+
+
+def seen(here: Visitor) -> dict[str, Any]:
+    """All that a visitor may have changed."""
+    page = here.page
+    return {
+        "room": here.room,
+        "position": [round(float(value), 2) for value in here.position],
+        "look": [round(float(value), 2) for value in here.look],
+        "see": page.evaluate("window.tourgen.see"),
+        "language": page.evaluate("document.documentElement.lang"),
+        "panel": page.locator(".panel").is_visible(),
+        "notice": page.locator(".notice").is_visible(),
+        "tools": page.locator(".tool-bar").count(),
+        "address": page.url,
+    }
+
+
+# ---- attracting, visiting, forgetting
+
+
+def test_it_attracts_in_every_language_and_goes_from_stop_to_stop(kiosk: Kiosk) -> None:
+    here = kiosk()
+    assert state(here.page) == "attract"
+    told = here.page.locator(".start-screen").inner_text()
+    for words in ("Ar Steren lighthouse", "Phare d'Ar Steren", "Touch to begin", "Touchez"):
+        assert words in told
+    places = set()
+    for _ in range(6):
+        leave_alone(here, 10)
+        here.wait("window.tourgen.ready")
+        places.add((here.room, *(round(float(value), 1) for value in here.position)))
+    assert len(places) > 3
+    for hidden in (".top", ".dock", ".mini-map"):
+        assert not here.page.locator(hidden).is_visible()
+
+
+def test_a_touch_begins_in_the_language_touched_and_nothing_of_it_stays(kiosk: Kiosk) -> None:
+    here = kiosk()
+    begin(here, "en")
+    fresh = seen(here)
+    page = here.page
+    begin_again(here, "fr")
+    assert seen(here)["language"] == "fr"
+    page.get_by_role("button", name="Pièces").click()
+    page.locator(".panel").get_by_role("link", name="Escalier").click()
+    here.await_room("stairs")
+    page.get_by_role("button", name="Orbite").click()
+    here.wait("window.tourgen.see === 'orbit'")
+    page.get_by_role("button", name="Outils").click()
+    page.get_by_role("button", name="Ce qui a été relevé").click()
+    leave_alone(here, IDLE_S + 1)
+    assert state(page) == "warning"
+    assert "Êtes-vous toujours là" in page.get_by_role("alertdialog").inner_text()
+    leave_alone(here, WARNING_S + 1)
+    assert state(page) == "attract"
+    begin(here, "en")
+    assert seen(here) == fresh
+
+
+def begin_again(here: Visitor, language: str) -> None:
+    here.page.get_by_role("button", name="Start over").click()
+    assert state(here.page) == "attract"
+    begin(here, language)
+
+
+def test_whoever_is_still_there_goes_on(kiosk: Kiosk) -> None:
+    here = kiosk()
+    begin(here)
+    leave_alone(here, IDLE_S - 5)
+    assert state(here.page) == "visit"
+    here.page.mouse.move(300, 300)
+    leave_alone(here, IDLE_S - 5)
+    assert state(here.page) == "visit"
+    leave_alone(here, 10)
+    assert state(here.page) == "warning"
+    here.page.get_by_role("button", name="Go on").click()
+    assert state(here.page) == "visit"
+    leave_alone(here, IDLE_S - 5)
+    assert state(here.page) == "visit"
+
+
+def test_who_is_led_and_touches_nothing_is_not_asked(kiosk: Kiosk) -> None:
+    here = kiosk()
+    begin(here)
+    here.page.get_by_role("button", name="Guided tour").click()
+    leave_alone(here, IDLE_S + 2)
+    here.wait("window.tourgen.ready")
+    assert state(here.page) == "visit"
+
+
+def test_a_changed_clock_changes_nothing(kiosk: Kiosk) -> None:
+    here = kiosk()
+    begin(here)
+    for when in (datetime(2026, 7, 7, 12), datetime(2026, 7, 6, 12)):
+        here.page.clock.set_system_time(when)
+        leave_alone(here, 1)
+        assert state(here.page) == "visit"
+    leave_alone(here, IDLE_S)
+    assert state(here.page) == "warning"
+
+
+# ---- no way out
+
+
+def test_what_leads_out_is_a_code(site: Path, kiosk: Kiosk) -> None:
+    here = kiosk()
+    begin(here)
+    page = here.page
+    page.get_by_role("button", name="Tools").click()
+    page.get_by_role("button", name="About this tour").click()
+    page.locator(".panel").get_by_role("link", name="CC BY 4.0").click()
+    code = page.locator(".panel img.code")
+    code.wait_for()
+    assert page.url.startswith(f"{here.origin}/kiosk.html")
+    assert len(page.context.pages) == 1
+    address = "https://creativecommons.org/licenses/by/4.0/"
+    path = str(code.get_attribute("src")).removeprefix(f"{here.origin}/")
+    assert (site / path).read_bytes() == code_of(address)
+    assert code.evaluate("image => image.naturalWidth") > 0
+
+
+KEYS = (
+    "Control+p", "Control+s", "Control+o", "Control+f", "Control+r", "Control+u", "Control+d",
+    "Control+h", "Control+j", "Control+l", "Control+Plus", "Control+0", "Control+Shift+i", "F1",
+    "F3", "F5", "F7", "F11", "F12", "Alt+ArrowLeft", "Alt+Home", "Meta+l", "Backspace",
+)  # fmt: skip
+
+
+def test_keys_gestures_and_drops_that_leave_the_page_are_refused(kiosk: Kiosk) -> None:
+    here = kiosk()
+    begin(here)
+    page = here.page
+    page.evaluate(
+        "window.passed = [];"
+        "for (const kind of ['keydown', 'contextmenu', 'dragstart', 'dragover', 'drop', 'wheel',"
+        " 'selectstart', 'auxclick', 'copy', 'paste']) document.addEventListener(kind, (event) => {"
+        " if (!event.defaultPrevented) window.passed.push(kind + ' ' + (event.key ?? '')); })"
+    )
+    for keys in KEYS:
+        page.keyboard.press(keys)
+    page.mouse.click(400, 300, button="right")
+    page.mouse.click(400, 300, button="middle")
+    page.evaluate(
+        "for (const kind of ['dragstart', 'dragover', 'drop', 'selectstart', 'copy', 'paste'])"
+        " document.body.dispatchEvent(new Event(kind, { bubbles: true, cancelable: true }));"
+        "document.body.dispatchEvent(new WheelEvent('wheel',"
+        " { bubbles: true, cancelable: true, ctrlKey: true }))"
+    )
+    passed = page.evaluate("window.passed")
+    # A modifier by itself does nothing.
+    assert [each for each in passed if not each.endswith((" Control", " Alt", " Meta", " Shift"))] == []
+    assert page.url == f"{here.origin}/kiosk.html?levels=root"
+    page.keyboard.press("ArrowLeft")
+    assert "keydown ArrowLeft" in page.evaluate("window.passed")
+
+
+# ---- the service corner
+
+
+def open_corner(here: Visitor) -> None:
+    for _ in range(5):
+        here.page.mouse.click(30, 30)
+    here.page.locator(".pin-pad").wait_for()
+
+
+def enter(here: Visitor, pin: str) -> None:
+    for digit in pin:
+        here.page.get_by_role("button", name=digit, exact=True).click()
+
+
+def test_the_service_corner_counts_visits_by_room_and_language(kiosk: Kiosk) -> None:
+    here = kiosk(accept_downloads=True)
+    begin(here, "fr")
+    begin_again_from_french(here)
+    page = here.page
+    page.get_by_role("button", name="Rooms").click()
+    page.locator(".panel").get_by_role("link", name="Spiral stair").click()
+    here.await_room("stairs")
+    open_corner(here)
+    enter(here, "1234")
+    page.get_by_text("Not these").wait_for()
+    enter(here, PIN)
+    page.get_by_role("button", name="Save the visits").wait_for()
+    assert "00:00:" in page.locator(".panel").inner_text()
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Save the visits").click()
+    rows = list(csv.DictReader(Path(saved.value.path()).read_text("utf-8").splitlines()))
+    assert [(row["room"], row["language"], row["visits"]) for row in rows] == [
+        ("chamber1", "en", "1"),
+        ("chamber1", "fr", "1"),
+        ("stairs", "en", "1"),
+    ]
+    assert {row["day"] for row in rows} == {"2026-07-06"}
+
+
+def begin_again_from_french(here: Visitor) -> None:
+    here.page.get_by_role("button", name="Recommencer").click()
+    begin(here, "en")
+
+
+def test_who_guesses_the_pin_waits(kiosk: Kiosk) -> None:
+    here = kiosk()
+    begin(here)
+    open_corner(here)
+    for guess in ("0000", "1111", "2222", "3333", "4444"):
+        enter(here, guess)
+        here.page.get_by_text("Not these").wait_for()
+    enter(here, PIN)
+    here.page.wait_for_timeout(500)
+    assert here.page.locator(".pin-pad").is_visible()
+    leave_alone(here, 59)
+    open_corner(here)
+    leave_alone(here, 2)
+    enter(here, PIN)
+    here.page.get_by_role("button", name="Save the visits").wait_for()
+
+
+# ---- lasting
+
+
+def test_a_lost_graphics_context_comes_back_or_the_page_begins_anew(kiosk: Kiosk) -> None:
+    here = kiosk()
+    here.page.evaluate(
+        "window.first = true;"
+        "window.lost = document.querySelector('canvas').getContext('webgl2')"
+        ".getExtension('WEBGL_lose_context'); window.lost.loseContext()"
+    )
+    leave_alone(here, 2)
+    here.page.evaluate("window.lost.restoreContext()")
+    leave_alone(here, 2)
+    assert here.page.evaluate("window.first")
+    assert state(here.page) == "attract"
+    here.page.evaluate("window.lost.loseContext()")
+    leave_alone(here, 8)
+    here.wait("!window.first && window.tourgen?.ready")
+    assert state(here.page) == "attract"
+
+
+def test_a_room_that_does_not_come_is_asked_for_again(kiosk: Kiosk) -> None:
+    here = kiosk()
+    begin(here)
+    here.page.route("**/stairs/**", lambda route: route.abort())
+    here.page.get_by_role("button", name="Rooms").click()
+    here.page.locator(".panel").get_by_role("link", name="Spiral stair").click()
+    here.page.locator(".notice.grave").wait_for()
+    leave_alone(here, IDLE_S + WARNING_S + 2)
+    assert state(here.page) == "attract"
+    here.await_room("chamber1")
+    here.forgive("stairs", "ERR_FAILED")
+
+
+def test_visits_of_many_visitors_leave_nothing_behind(site: Path, kiosk: Kiosk) -> None:
+    """Random touches of many visitors under a clock that runs fast; ``make soak`` does hours."""
+    here = kiosk()
+    dice = random.Random(7)
+    begin(here)
+    fresh = seen(here)
+    assert set(rooms_of(site)) == {"chamber1", "stairs", "chamber2"}
+    for _ in range(4):
+        for _ in range(dice.randint(4, 10)):
+            x, y = dice.uniform(0, SIZE[0]), dice.uniform(0, SIZE[1])
+            here.page.mouse.move(x, y)
+            here.page.mouse.down()
+            if dice.random() < 0.4:
+                here.page.mouse.move(x + dice.uniform(-200, 200), y + dice.uniform(-90, 90))
+            here.page.mouse.up()
+            leave_alone(here, dice.uniform(0.2, 3))
+        leave_alone(here, IDLE_S + WARNING_S + 2)
+        for _ in range(10):  # where a guided tour was begun, it is let come to its end
+            if state(here.page) == "attract":
+                break
+            leave_alone(here, 60)
+        assert state(here.page) == "attract"
+        begin(here)
+        assert seen(here) == fresh

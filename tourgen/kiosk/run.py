@@ -1,0 +1,125 @@
+"""Run: serve a tour on loopback, and keep a browser on it."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from threading import Event, Thread
+from typing import Final
+
+import filelock
+import platformdirs
+
+from tourgen.doctor import BROWSERS, browser
+from tourgen.errors import InputError, MissingTool
+from tourgen.kiosk.lines import KioskHandler
+from tourgen.kiosk.screen import has_screen, start_browser, stop_browser
+from tourgen.kiosk.vigil import Vigil
+from tourgen.serve import open_server
+
+_TICK_S: Final = 0.2
+_SHORT_S: Final = 20.0
+"""A browser that ends sooner may end again: it is waited for ever longer."""
+_MOST_PAUSE_S: Final = 30.0
+
+
+def run_kiosk(site: Path, port: int = 8710, say: Callable[[str], None] = print) -> None:
+    """Show a published tour until it is closed from its service corner, or interrupted.
+
+    Args:
+        site: Its folder. A new version that is put there is taken over while nobody is about.
+        port: On loopback; the next free one above where it is taken. What the screen keeps, visits
+            and the tour itself, is kept under the port: it should stay the same.
+        say: Told what happens.
+
+    Raises:
+        InputError: There is no tour, another kiosk shows it, or there is no screen.
+        MissingTool: There is no Chromium.
+        StageError: No port was free.
+    """
+    program = browser()
+    if program is None:
+        raise MissingTool(
+            f"chromium: expected one of {', '.join(BROWSERS)} on the path, found none",
+            "install it, as `apt-get install chromium`",
+        )
+    if not has_screen():
+        raise InputError(
+            "screen: expected one to show the tour on, found none",
+            "start it from the desktop's own session, or set DISPLAY",
+        )
+    with _alone(site) as kept:
+        vigil, ended = Vigil(), Event()
+        answer = partial(KioskHandler, vigil=vigil, ended=ended, kept=kept)
+        with open_server(site, port=port, handler=answer) as server:
+            Thread(target=server.serve_forever, daemon=True).start()
+            taken = f" (port {port} is taken)" if server.server_address[1] != port else ""
+            say(f"Showing {site} from {server.address}{taken}, stop with Ctrl+C")
+            address = f"{server.address}kiosk.html?watched"
+            try:
+                _keep_showing(program, kept / "browser", address, vigil, ended, say)
+            finally:
+                ended.set()
+                server.shutdown()
+
+
+def _keep_showing(
+    program: Path,
+    profile: Path,
+    address: str,
+    vigil: Vigil,
+    ended: Event,
+    say: Callable[[str], None],
+) -> None:
+    """Start the browser as often as it ends."""
+    pause_s = 0.0
+    while not ended.is_set():
+        vigil.begin()
+        begun = time.monotonic()
+        shown = start_browser(program, profile, address)
+        try:
+            fault = _watched(shown.poll, vigil, ended)
+        except KeyboardInterrupt:
+            return
+        finally:
+            stop_browser(shown)
+        if fault is None:
+            return
+        say(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {fault}; the browser is started anew")
+        lasted = time.monotonic() - begun > _SHORT_S
+        pause_s = 0.0 if lasted else min(max(1.0, 2 * pause_s), _MOST_PAUSE_S)
+        ended.wait(pause_s)
+
+
+def _watched(ends: Callable[[], int | None], vigil: Vigil, ended: Event) -> str | None:
+    """Why the browser is to be started anew; None once the kiosk is closed."""
+    while not ended.wait(_TICK_S):
+        if ends() is not None:
+            return "the browser has ended"
+        if vigil.fault:
+            return vigil.fault
+    return None
+
+
+@contextmanager
+def _alone(site: Path) -> Iterator[Path]:
+    """What is kept of this kiosk on this machine, for it alone."""
+    name = hashlib.sha256(str(site.resolve()).encode()).hexdigest()[:12]
+    kept = Path(platformdirs.user_state_dir("tourgen")) / f"kiosk-{name}"
+    kept.mkdir(parents=True, exist_ok=True)
+    lock = filelock.FileLock(kept / "lock")
+    try:
+        lock.acquire(timeout=0)
+    except filelock.Timeout:
+        raise InputError(
+            f"`{site}`: expected no other kiosk, found one that shows it",
+            "close that one first, by its service corner or Ctrl+C",
+        ) from None
+    try:
+        yield kept
+    finally:
+        lock.release()
