@@ -69,12 +69,12 @@ class Visitor:
         self.wait("window.tourgen?.ready")
 
     def wait(self, condition: str) -> None:
-        """Wait until a JavaScript expression is true.
+        """Wait until a JavaScript expression, or what it promises, is true.
 
         Playwright's own wait evaluates strings in the page, which the published headers forbid.
         """
         end = time.monotonic() + WAIT_S
-        while not self.page.evaluate(f"Boolean({condition})"):
+        while not self.page.evaluate(f"Promise.resolve({condition}).then(Boolean)"):
             assert time.monotonic() < end, f"{condition}: still not so after {WAIT_S} s"
             self.page.wait_for_timeout(20)
 
@@ -149,7 +149,7 @@ class Visitor:
 def visitor(
     browser: Browser, origin: str, *, size: tuple[int, int] = (640, 400), **context: Any
 ) -> Visitor:
-    """A visitor with a browser profile of its own, who takes no tour along unless a test says so."""
+    """A visitor with a browser profile of its own, who takes a tour along if a test says so."""
     view = {"width": size[0], "height": size[1]}
     settings = {"service_workers": "block", **context}
     return Visitor(browser.new_context(viewport=view, **settings).new_page(), origin)

@@ -14,7 +14,7 @@ const PATIENCE_MS = 500;
 async function main(): Promise<void> {
   const host = document.getElementById("tour");
   if (!host) throw new Error("page: expected an element with id `tour`, found none");
-  const site = new URL(host.dataset["site"] ?? "./", location.href);
+  const site = new URL(host.dataset["site"] || "./", location.href);
   const words = wordsIn(chooseLanguage(["en", "fr"], navigator.languages));
   if (!canDraw()) return showPlain(host, words.noWebgl);
   let tour;

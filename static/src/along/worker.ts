@@ -9,7 +9,8 @@
 import { clientsClaim, type WorkboxPlugin } from "workbox-core";
 import { addPlugins, matchPrecache, precacheAndRoute } from "workbox-precaching";
 import { RangeRequestsPlugin } from "workbox-range-requests";
-import { setCatchHandler } from "workbox-routing";
+import { NavigationRoute, registerRoute, setCatchHandler } from "workbox-routing";
+import { NetworkOnly } from "workbox-strategies";
 import type { Asked, Told } from "./messages.ts";
 
 interface File {
@@ -35,6 +36,8 @@ addPlugins([
   new RangeRequestsPlugin() as WorkboxPlugin, // sounds are asked for by parts
 ]);
 precacheAndRoute(self.tour.files, { ignoreURLParametersMatching: [/./], cleanURLs: false });
+// A page that is not of the tour: as the host answers, and where there is none, as it would.
+registerRoute(new NavigationRoute(new NetworkOnly()));
 setCatchHandler(async ({ request }) => {
   const page = request.destination === "document" ? await matchPrecache("404.html") : undefined;
   return page ?? Response.error();

@@ -6,17 +6,11 @@ export class Idle {
   /** Of the clock that no change of date moves. */
   #since = performance.now();
 
-  /** @param touched Told of each sign of somebody. */
-  constructor(target: Window, touched: () => void) {
+  /** @param touched Told of each sign of somebody; by a pointer or not. */
+  constructor(target: Window, touched: (byPointer: boolean) => void) {
     for (const sign of SIGNS) {
-      target.addEventListener(
-        sign,
-        () => {
-          this.reset();
-          touched();
-        },
-        { capture: true, passive: true },
-      );
+      const byPointer = /^(pointer|touch)/.test(sign);
+      target.addEventListener(sign, () => touched(byPointer), { capture: true, passive: true });
     }
   }
 

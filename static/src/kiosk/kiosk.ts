@@ -61,7 +61,7 @@ export class Kiosk {
     this.#start = new StartScreen(tour, logo, (language) => this.#begin(language));
     host.append(this.#start.element, this.#warning.element);
     host.classList.toggle("low", settings.low);
-    this.#idle = new Idle(window, () => this.#touched());
+    this.#idle = new Idle(window, (byPointer) => this.#touched(byPointer));
     lock(window, (address) => this.#showCode(address));
     window.addEventListener("pointerdown", (event) => this.#touchedAt(event), { capture: true });
     this.#front.canvas.addEventListener("webglcontextlost", () => {
@@ -127,7 +127,10 @@ export class Kiosk {
   }
 
   /** Any sign of somebody. */
-  #touched(): void {
+  #touched(byPointer: boolean): void {
+    // A touch of the warning is for it alone: it goes once that has ended, or would reach the room.
+    if (this.#state === "warning" && byPointer) return;
+    this.#idle.reset();
     if (this.#state === "warning") this.#goOn();
     if (this.#state === "asleep") this.#attract();
   }

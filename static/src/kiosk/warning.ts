@@ -12,7 +12,7 @@ export class Warning {
 
   /** @param stay Told that somebody is. */
   constructor(stay: () => void) {
-    this.#stay = button("plain-button", stay);
+    this.#stay = button("plain-button", () => undefined);
     this.element = element(
       "div",
       { class: "warning", role: "alertdialog", "aria-labelledby": "warning-question", hidden: true },
@@ -25,6 +25,7 @@ export class Warning {
         this.#stay,
       ),
     );
+    this.element.addEventListener("click", stay);
   }
 
   show(words: Words): void {
