@@ -17,7 +17,7 @@ help:
 	@echo "make bench-fidelity   every method and its peers against it (BENCH='--room chamber1')"
 	@echo "make bench-speed      time and memory beside what one does by hand (BENCH='--points 1300000')"
 	@echo "make bench-rooms      how many rooms use two cores"
-	@echo "make soak        a build killed at 30 moments, half an hour of wandering: an hour"
+	@echo "make soak        a build killed at 30 moments, half an hour of wandering, hours of a kiosk"
 	@echo "make pictures    screenshots of the demo for README and docs"
 	@echo "make lock        pin the newest versions, with their hashes"
 	@echo "make clean       drop all that make made"
@@ -108,6 +108,8 @@ lint: install
 soak: install system-tests tests/node_modules/.package-lock.json
 	$(BIN)/pytest tests/commands/test_kills.py --kills 30
 	$(BIN)/pytest tests/browser/test_wander.py --wander 1800
+	$(BIN)/pytest -rP tests/commands/test_kiosk.py --acts 10000
+	$(BIN)/pytest -rP tests/browser/test_kiosk_soak.py --kiosk-visits 160 --kiosk-seconds 3600
 
 .PHONY: bench
 bench: demo

@@ -20,6 +20,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--wander", type=float, default=20, help="seconds of wandering about (make soak: 1800)"
     )
     parser.addoption("--tour", type=Path, help="judge this built tour, not a miniature of the demo")
+    parser.addoption(
+        "--acts", type=int, default=200, help="random acts at the kiosk (make soak: 10000)"
+    )
+    parser.addoption(
+        "--kiosk-visits", type=int, default=4, help="visits at the kiosk (make soak: 160)"
+    )
+    parser.addoption(
+        "--kiosk-seconds", type=float, default=10, help="of a kiosk as it goes (make soak: 3600)"
+    )
     parser.addoption("--kills", type=int, default=2, help="builds that are killed (make soak: 30)")
 
 

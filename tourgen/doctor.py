@@ -30,6 +30,9 @@ BENCH_LIBRARIES = {
 }
 """What ``import pymeshlab`` loads besides, for the benches."""
 
+TEST_PROGRAMS = {"Xvfb": "xvfb", "xdotool": "xdotool"}
+"""A screen and hands for the tests of the kiosk, and the Debian package of each."""
+
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 """Programs that can draw a tour for the tests, the best known first."""
 
@@ -71,6 +74,8 @@ def findings(folder: Path, *, tests: bool = False, bench: bool = False) -> list[
     found = [*_libraries(LIBRARIES, "Open3D"), *_disk(folder), *_memory()]
     if bench:
         found += _libraries(BENCH_LIBRARIES, "PyMeshLab")
+    if tests:
+        found += _programs(TEST_PROGRAMS)
     if tests and browser() is None:
         found.append(
             Finding(
@@ -98,6 +103,13 @@ def _libraries(wanted: Mapping[str, str], by: str) -> Iterator[Finding]:
         except OSError as error:
             mend = _install_line(package, of=library)
             yield Finding(library, f"needed by {by}, {error}", mend, package)
+
+
+def _programs(wanted: Mapping[str, str]) -> Iterator[Finding]:
+    for program, package in wanted.items():
+        if shutil.which(program) is None:
+            mend = _install_line(package, of=program)
+            yield Finding(program, "needed by the tests, not found on the path", mend, package)
 
 
 def _install_line(package: str, *, of: str) -> str:

@@ -48,6 +48,9 @@ class KioskHandler(TourHandler):
         if self.path == f"{FOLDER}alive":
             self._vigil.alive()
             self._answer(HTTPStatus.OK)
+        elif self.path == f"{FOLDER}leaves":
+            self._vigil.begin()
+            self._answer(HTTPStatus.OK)
         elif self.path == f"{FOLDER}visits":
             self._answer(HTTPStatus.OK, self._keep(body))
         elif self.path == f"{FOLDER}end":

@@ -20,6 +20,7 @@ from tourgen.kiosk.lines import KioskHandler
 from tourgen.kiosk.screen import has_screen, start_browser, stop_browser
 from tourgen.kiosk.vigil import Vigil
 from tourgen.serve import open_server
+from tourgen.site import restore_site
 
 _TICK_S: Final = 0.2
 _SHORT_S: Final = 20.0
@@ -52,6 +53,7 @@ def run_kiosk(site: Path, port: int = 8710, say: Callable[[str], None] = print) 
             "screen: expected one to show the tour on, found none",
             "start it from the desktop's own session, or set DISPLAY",
         )
+    restore_site(site)
     with _alone(site) as kept:
         vigil, ended = Vigil(), Event()
         answer = partial(KioskHandler, vigil=vigil, ended=ended, kept=kept)

@@ -10,6 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
+from PIL import ImageGrab
+
 SWITCHES: Final = (
     "--kiosk",
     "--no-first-run",
@@ -39,7 +41,7 @@ def start_browser(program: Path, profile: Path, address: str) -> subprocess.Pope
     """Start it in a group of its own."""
     root = _AS_ROOT if hasattr(os, "geteuid") and os.geteuid() == 0 else ()
     return subprocess.Popen(
-        [program, *SWITCHES, *root, f"--user-data-dir={profile}", f"--app={address}"],
+        [program, *SWITCHES, *_whole(), *root, f"--user-data-dir={profile}", f"--app={address}"],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -56,6 +58,20 @@ def stop_browser(browser: subprocess.Popen[bytes]) -> None:
         with suppress(ProcessLookupError):
             os.killpg(browser.pid, signal.SIGKILL)
     browser.wait()
+
+
+def _whole() -> tuple[str, ...]:
+    """A size that covers the screen: without a window manager no window fills it by itself.
+
+    Of a window as large as the screen Chromium takes a pixel off.
+    """
+    if sys.platform != "linux" or not os.environ.get("DISPLAY"):
+        return ()
+    try:
+        width, height = ImageGrab.grab(xdisplay="").size
+    except OSError:
+        return ()
+    return "--window-position=0,0", f"--window-size={width + 1},{height + 1}"
 
 
 def has_screen() -> bool:

@@ -13,8 +13,8 @@ from typing import Final
 
 COMES_WITHIN_S: Final = 60.0
 """A slow machine starts a browser and loads the page in so long."""
-GONE_S: Final = 2.0
-"""A page that loads anew is without a line for less."""
+GONE_S: Final = 0.7
+"""A line that broke by itself is opened anew in less."""
 HANGS_S: Final = 20.0
 """Signs come every two seconds, unless the page is busy."""
 
@@ -31,7 +31,7 @@ class Vigil:
         self.begin()
 
     def begin(self) -> None:
-        """The browser was started."""
+        """The browser was started, or the page loads anew."""
         with self._lock:
             self._lines, self._came = 0, False
             self._since = self._sign = self._now()

@@ -181,8 +181,10 @@ export class Kiosk {
   }
 
   #reload(): void {
+    if (this.#isReloading) return;
     this.#isReloading = true;
-    location.reload();
+    const told = this.#watch?.post("leaves") ?? Promise.resolve();
+    void told.then(() => location.reload());
   }
 
   // ------------------------------------------------------------------ codes and service

@@ -67,5 +67,6 @@ export function lock(page: Window, leave: (address: string) => void): void {
 
 function isRefused(event: KeyboardEvent): boolean {
   const modified = event.ctrlKey || event.altKey || event.metaKey;
-  return modified || !KEYS.test(event.key);
+  const tasks = event.shiftKey && event.key === "Escape"; // Chromium lists its own
+  return modified || tasks || !KEYS.test(event.key);
 }

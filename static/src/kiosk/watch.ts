@@ -20,7 +20,7 @@ export class Watch {
   }
 
   /** Tells something. Returns the answer; null where there is none. */
-  async post(what: "alive" | "visits" | "end", body = ""): Promise<string | null> {
+  async post(what: "alive" | "leaves" | "visits" | "end", body = ""): Promise<string | null> {
     try {
       const response = await fetch(new URL(`.kiosk/${what}`, this.#site), { method: "POST", body });
       return response.ok ? await response.text() : null;
