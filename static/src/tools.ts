@@ -14,8 +14,8 @@ export interface ToolsHost {
   readonly stage: Stage;
   readonly front: Frontend;
   readonly rooms: Rooms;
-  /** Of the present view. */
-  address(): string;
+  /** Of the present view; null where it has none that others could use. */
+  address(): string | null;
   /** Shows the room in a headset. */
   immerse(): void;
   /** Goes to a room, or to a note of it. */
@@ -70,8 +70,10 @@ export class Tools {
       { name: words.section, drawing: "section", isOn: this.#isCut, act: () => void this.#cut() },
       { name: words.tint, drawing: "tint", isOn: this.#isTinted, act: () => this.#toggleTint() },
       { name: words.picture, drawing: "camera", act: () => this.#takePicture() },
-      { name: words.share, drawing: "share", act: () => void this.#share() },
     ];
+    if (this.#host.address() !== null) {
+      tools.push({ name: words.share, drawing: "share", act: () => void this.#share() });
+    }
     if (this.#canImmerse) {
       const act = (): void => {
         this.#host.front.panel.close();
@@ -198,8 +200,10 @@ export class Tools {
 
   async #share(): Promise<void> {
     const { front } = this.#host;
+    const address = this.#host.address();
+    if (address === null) return;
     const { shareSheet } = await import("./modes/share.ts");
-    front.panel.open(front.words.share, shareSheet(front.title, this.#host.address(), front.words));
+    front.panel.open(front.words.share, shareSheet(front.title, address, front.words));
   }
 
   async #fillScreen(): Promise<void> {

@@ -1,10 +1,11 @@
 /** A visit: one way of seeing after the other, room after room, and the loop that shows it all. */
 
 import { Vector3, type LoadingManager, type Raycaster } from "three";
-import { hashOf, placeIn, roomAddress, roomAt, type Place, type Way } from "./address.ts";
+import { placeIn, type Addresses, type Place, type Way } from "./address.ts";
 import type { Hit } from "./walk/collider.ts";
 import { readQuery, type Diagnostics } from "./diagnostics.ts";
 import { prefersStillness } from "./dom.ts";
+import type { Files } from "./files.ts";
 import { Frontend } from "./page/frontend.ts";
 import { PlanSheet } from "./page/plan-sheet.ts";
 import { Tools } from "./tools.ts";
@@ -49,7 +50,7 @@ const EYE_M = 1.6;
 const AIM_PX = 130;
 
 export class Visit {
-  readonly #site: URL;
+  readonly #addresses: Addresses;
   readonly #tour: Tour;
   readonly #stage: Stage;
   readonly #front: Frontend;
@@ -72,16 +73,13 @@ export class Visit {
   #then: (() => void) | null = null;
   #rest: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(host: HTMLElement, site: URL, decoder: URL, tour: Tour, room: Room) {
-    this.#site = site;
+  constructor(host: HTMLElement, files: Files, addresses: Addresses, tour: Tour, room: Room) {
+    this.#addresses = addresses;
     this.#tour = tour;
-    const wishes = [
-      new URLSearchParams(location.search).get("lang"),
-      chosenLanguage(),
-      ...navigator.languages,
-    ];
+    const asked = addresses.languageAt(new URL(location.href));
+    const wishes = [asked, chosenLanguage(), ...navigator.languages];
     const language = chooseLanguage(tour.languages, wishes);
-    this.#front = new Frontend(host, site, tour, room, language, {
+    this.#front = new Frontend(host, files, addresses, tour, room, language, {
       door: (link) => this.#walkThrough(link),
       reached: (at) => this.#act(() => this.#visitor.face(new Vector3(...at))),
       chosen: (next) => this.#go(next, next.entry),
@@ -96,9 +94,9 @@ export class Visit {
     const canvas = this.#front.canvas;
     this.#stage = new Stage(canvas, this.#query.background, (dt) => this.#frame(dt));
     this.#stage.scene.add(this.#marker.group);
-    const manager: LoadingManager = tileDecoder(decoder);
+    const manager: LoadingManager = tileDecoder(files);
     this.#rooms = new Rooms(
-      site,
+      files,
       tour,
       room,
       this.#stage,
@@ -198,7 +196,7 @@ export class Visit {
   /** To another room's page, by its address. */
   #go(room: Room, view: View, then: (() => void) | null = null): void {
     this.#noteView();
-    history.pushState(null, "", roomAddress(this.#site, room.id, location.search));
+    history.pushState(null, "", this.#addresses.ofRoom(new URL(location.href), room.id));
     this.#leaveWay();
     this.#then = then;
     void this.#rooms.enter(room, view, true);
@@ -206,7 +204,8 @@ export class Visit {
 
   /** Goes where the address says, after a step through the history or by hand. */
   #follow(): void {
-    const room = roomCalled(this.#tour, roomAt(this.#site, location.href)) ?? startOf(this.#tour);
+    const named = this.#addresses.roomAt(new URL(location.href));
+    const room = roomCalled(this.#tour, named) ?? startOf(this.#tour);
     const place = placeIn(location.hash);
     if (room !== this.#rooms.room || !this.#rooms.isOpen) this.#enter(room, place, true);
     else {
@@ -222,8 +221,8 @@ export class Visit {
   #noteView(): void {
     clearTimeout(this.#rest);
     if (!this.#rooms.isOpen) return;
-    const hash = hashOf(this.#place());
-    if (`#${hash}` !== location.hash) history.replaceState(history.state, "", `#${hash}`);
+    const address = this.#addresses.ofPlace(new URL(location.href), this.#place());
+    if (address !== location.href) history.replaceState(history.state, "", address);
   }
 
   #place(): Place {
@@ -231,8 +230,10 @@ export class Visit {
     return { view: this.#view(), way: this.#way, note: note > 0 ? note : null };
   }
 
-  #address(): string {
-    return roomAddress(this.#site, this.#rooms.room.id, location.search, this.#place());
+  #address(): string | null {
+    const here = new URL(location.href);
+    const { id } = this.#rooms.room;
+    return this.#addresses.forOthers(here, this.#tour.address, id, this.#place());
   }
 
   #tell(message: string): void {
@@ -429,9 +430,8 @@ export class Visit {
 
   #speak(language: string): void {
     chooseLanguageForGood(language);
-    const url = new URL(location.href);
-    url.searchParams.set("lang", language);
-    history.replaceState(history.state, "", url);
+    const address = this.#addresses.inLanguage(new URL(location.href), language);
+    history.replaceState(history.state, "", address);
     this.#guide?.say(this.#front.words, (stop) => this.#front.text(stop.text));
     this.#sheet?.say(this.#front.words);
     this.#tools.say();
