@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import tourgen.site.single as single
-from tourgen.errors import Faults
+from tourgen.errors import Faults, InputError
 from tourgen.site.single import write_singles
 
 SCRIPT = "console.log('the viewer');"
@@ -145,7 +145,9 @@ def test_a_room_alone_has_no_doors_but_a_guide(site: Path) -> None:
 def test_only_what_is_in_the_file_may_run_and_nothing_is_asked_for(site: Path) -> None:
     for page in written(site).values():
         (policy,) = re.findall(r'Content-Security-Policy" content="([^"]+)"', page)
-        assert page.index("<meta charset") < page.index(policy) < page.index("<style>")
+        assert page.index("<head>") < page.index("<meta charset") < page.index(policy)
+        assert page.index(policy) < page.index("<link")
+        assert page.count("charset=") == 1
         rules = dict(rule.split(" ", 1) for rule in policy.split("; "))
         assert rules["default-src"] == "'none'"
         (script,) = re.findall(r'<script type="module">(.*?)</script>', page, re.DOTALL)
@@ -177,6 +179,12 @@ def test_links_lead_to_places_in_the_page_or_are_gone(site: Path) -> None:
     assert '<img alt="" data-shows="rooms/loft/notes/1.svg">' in whole
     assert whole.count("<main") == whole.count("</main>") == 1
     assert '<script type="application/ld+json">{"name": "Light &amp; sea"}</script>' in whole
+
+
+def test_a_template_without_a_place_for_them_is_told(site: Path) -> None:
+    (site / "rooms/hall/index.html").write_text("<p>hall</p>")
+    with pytest.raises(InputError, match=r"^`templates/room\.html`: expected a page with `<head>`"):
+        write_singles(site, SCRIPT, site / "single")
 
 
 def test_a_room_too_large_for_browsers_is_told_and_nothing_written(

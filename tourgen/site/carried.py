@@ -15,10 +15,10 @@ from urllib.parse import unquote, urlsplit
 from tourgen.headers import content_type
 
 _MEDIA: Final = frozenset({"audio", "img", "source", "track", "video"})
-_OF_HOSTS: Final = ("og:", "twitter:")
+_PREVIEWED: Final = ("og:", "twitter:")
 """What previews of a link read; a file on a disk has none."""
 
-_URL: Final = re.compile(r"""url\(["']?(?!data:)([^"')]+)["']?\)""")
+_URL: Final = re.compile(r"""url\(["']?(?!data:|#)([^"')]+)["']?\)""")
 _ROOM_PAGE: Final = re.compile(r"rooms/([^/]+)/index\.html")
 _EMPTY: Final = re.compile(r"<(li|ul|p)>\s*</\1>\n?")
 
@@ -74,9 +74,7 @@ class Carrying(HTMLParser):
             self._left_out = tag
         elif tag in _MEDIA and "src" in given:
             self._put_medium(tag, given)
-        elif tag == "meta" and str(given.get("property") or given.get("name")).startswith(
-            _OF_HOSTS
-        ):
+        elif tag == "meta" and _is_of_hosts(given):
             return
         elif "data-site" in given:
             self._put_tag(tag, {key: value for key, value in given.items() if key != "data-site"})
@@ -174,3 +172,9 @@ class Carrying(HTMLParser):
 
     def _data(self, path: str) -> str:
         return data_address(path, (self._site / path).read_bytes())
+
+
+def _is_of_hosts(meta: Attributes) -> bool:
+    """Whether it speaks of what comes from a host; a single file says anew how it is written."""
+    name = meta.get("property") or meta.get("name") or ""
+    return "charset" in meta or name.startswith(_PREVIEWED)

@@ -32,7 +32,7 @@ _FOR_HOSTS: Final = frozenset({"index.html", "preview.jpg"})
 """What a room's folder holds that the viewer never asks for."""
 
 _MAIN: Final = re.compile(r"<main\b[^>]*>(.*?)</main>", re.DOTALL)
-_CHARSET: Final = re.compile(r"<meta charset[^>]*>")
+_PAGE: Final = re.compile(r"(.*?<head\b[^>]*>)(.*)(</body>.*)", re.DOTALL)
 
 Json = dict[str, Any]
 
@@ -52,6 +52,7 @@ def write_singles(site: Path, script: str, out: Path) -> Json:
 
     Raises:
         Faults: The file of a room would be larger than browsers open.
+        InputError: A publisher's own template makes pages without head or body.
     """
     told: Json = json.loads((site / "tour.json").read_bytes())
     rooms = [
@@ -112,19 +113,20 @@ class Single:
         poster = f"rooms/{self.told['start']}/poster.webp"
         page = Carrying(site, self.page, self.rooms, poster)
         policy = carried_policy([_digest(script)], [_digest(style) for style in page.styles])
-        meta = f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
-        text = _CHARSET.sub(lambda charset: f"{charset[0]}\n{meta}", page.text, count=1)
-        if self.page == _START:
-            text = self._with_rooms(site, text)
-        head, _, tail = text.rpartition("</body>")
+        text = self._with_rooms(site, page.text) if self.page == _START else page.text
+        start, content, end = _parted(text)
         self.file.parent.mkdir(parents=True, exist_ok=True)
         with self.file.open("w", encoding="utf-8", newline="\n") as out:
-            out.write(f'{head}<script type="module">{script}</script>\n')
+            out.write(start)
+            # No host tells how it is written, nor what it may do.
+            out.write('\n<meta charset="utf-8">\n')
+            out.write(f'<meta http-equiv="Content-Security-Policy" content="{policy}">')
+            out.write(f'{content}<script type="module">{script}</script>\n')
             out.write(_carrier("tour.json", json.dumps(self.told, ensure_ascii=False).encode()))
             for path in self.files(site):
                 if path != page.poster:
                     out.write(_carrier(path, (site / path).read_bytes()))
-            out.write(f"</body>{tail}")
+            out.write(end)
         return self.file.stat().st_size
 
     def _with_rooms(self, site: Path, text: str) -> str:
@@ -134,8 +136,8 @@ class Single:
             page = Carrying(site, f"rooms/{room}/index.html", self.rooms)
             if match := _MAIN.search(page.text):
                 told.append(f'<article id="room={room}">{match[1]}</article>\n')
-        head, end, tail = text.rpartition("</main>")
-        return f"{head}{''.join(told)}{end}{tail}"
+        before, end, after = text.rpartition("</main>")
+        return f"{before}{''.join(told)}{end}{after}" if end else text
 
 
 def _alone(told: Json, room: Json) -> Json:
@@ -166,6 +168,17 @@ def _require_small(site: Path, singles: Iterable[Single]) -> None:
 
 def _mb(size: int) -> str:
     return f"{size // 10**6} MB"
+
+
+def _parted(page: str) -> tuple[str, str, str]:
+    """A page up to the content of its head, up to the end of its body, and what follows."""
+    match = _PAGE.fullmatch(page)
+    if match is None:
+        raise InputError(
+            "`templates/room.html`: expected a page with `<head>` and `</body>`, found none",
+            "compare it with tourgen's own, or remove it",
+        )
+    return match[1], match[2], match[3]
 
 
 def _carrier(path: str, content: bytes) -> str:
