@@ -1,6 +1,7 @@
 // Bundles the viewer into dist/: scripts, style and Draco decoder under names that carry their
 // digest, so that they may be cached for ever, and manifest.json that says what they are called.
-// What a visit may never use lies in scripts of its own.
+// What a visit may never use lies in scripts of its own. single.js is the same viewer in one script,
+// for pages that carry all they show.
 import { createHash } from "node:crypto";
 import { copyFile, mkdir, readFile, rm, writeFile } from "node:fs/promises";
 import { basename, dirname, join } from "node:path";
@@ -21,39 +22,45 @@ await mkdir(join(dist, draco), { recursive: true });
 for (const name of decoderFiles) await copyFile(join(decoder, name), join(dist, draco, name));
 await copyFile(join(here, "src/icon.svg"), join(dist, "icon.svg"));
 
-const { metafile } = await build({
-  entryPoints: {
-    viewer: join(here, "src/main.ts"),
-    style: join(here, "src/page/style.css"),
-    kiosk: join(here, "src/kiosk/kiosk.css"),
-  },
+const common = {
   outdir: dist,
-  entryNames: "[name]-[hash]",
-  chunkNames: "[name]-[hash]",
-  splitting: true,
   bundle: true,
   minify: true,
   format: "esm",
   target: ["es2022"],
   define: { DRACO_FOLDER: JSON.stringify(draco) },
   legalComments: "none",
-  metafile: true,
   absWorkingDir: here,
   logLevel: "warning",
+};
+
+const { metafile } = await build({
+  ...common,
+  entryPoints: {
+    viewer: join(here, "src/main.ts"),
+    style: join(here, "src/page/style.css"),
+    kiosk: join(here, "src/kiosk/kiosk.css"),
+  },
+  entryNames: "[name]-[hash]",
+  chunkNames: "[name]-[hash]",
+  splitting: true,
+  metafile: true,
 });
+await build({ ...common, entryPoints: { single: join(here, "src/single.ts") } });
+await requireInlinable(join(dist, "single.js"));
+
+/** Refuses what the parser of a page would end, or change so that its digest differs. */
+async function requireInlinable(script) {
+  const found = /<\/script|<!--|[\r\0]/i.exec(await readFile(script, "utf8"));
+  if (found) throw new Error(`${script}: found ${JSON.stringify(found[0])}, which no page can hold`);
+}
 
 // The service worker keeps its name and its place: at the site's root, told the site's files.
 await build({
+  ...common,
   entryPoints: { sw: join(here, "src/along/worker.ts") },
-  outdir: dist,
-  bundle: true,
-  minify: true,
   format: "iife",
-  target: ["es2022"],
   define: { "process.env.NODE_ENV": JSON.stringify("production") },
-  legalComments: "none",
-  absWorkingDir: here,
-  logLevel: "warning",
 });
 
 /** The published name of the output that was made from `source`. */

@@ -43,7 +43,7 @@ class Visitor:
 
     Attributes:
         page: Playwright's page.
-        origin: The only server that it may talk to.
+        origin: The only server that it may talk to, or the folder that its page lies in.
         faults: Console errors, exceptions, failed requests, requests elsewhere.
     """
 
@@ -133,7 +133,9 @@ class Visitor:
             self.faults.append(f"console: {message.text} ({message.location['url']})")
 
     def _asked(self, request: Request) -> None:
-        if not request.url.startswith((f"{self.origin}/", "data:", f"blob:{self.origin}/")):
+        # Pages from a disk are of no origin, and so are the blobs that they make.
+        blobs = "blob:null/" if self.origin.startswith("file:") else f"blob:{self.origin}/"
+        if not request.url.startswith((f"{self.origin}/", "data:", blobs)):
             self.faults.append(f"request elsewhere: {request.url}")
 
     def _failed(self, request: Request) -> None:

@@ -77,6 +77,7 @@ def build_tour(
     jobs: int | None = None,
     cluster: str | None = None,
     profile: Path | None = None,
+    single_files: bool = False,
 ) -> dict[str, Any]:
     """Build a tour's site.
 
@@ -88,6 +89,7 @@ def build_tour(
         jobs: Tasks that run at once; as many as there are cores if left out.
         cluster: Address of a dask scheduler, whose workers run them instead.
         profile: Page that a flame graph of what ran is written to.
+        single_files: Whether the site shall hold the tour and each room as one file, too.
 
     Returns:
         The report.
@@ -96,6 +98,7 @@ def build_tour(
         InputError: ``only`` cannot be used, or the output folder.
         MissingTool: The library for the address is not installed.
         RoomsFailed: Rooms could not be built.
+        Faults: The single file of a room would be larger than browsers open.
     """
     started = time.perf_counter()
     cache = Cache(tour.folder)
@@ -113,7 +116,8 @@ def build_tour(
     report = tour_report(rooms, time.perf_counter() - started)
     sent = is_remote(str(out))
     here = tour.folder / _SENT if sent else Path(out)
-    write_site(tour, _published(tour, {room.id: room for room in rooms}), report, here)
+    published = _published(tour, {room.id: room for room in rooms})
+    report = write_site(tour, published, report, here, single_files=single_files)
     if sent:
         send(here, str(out))
     cache.prune(frozenset(key for recipe in recipes for key in recipe.keys))

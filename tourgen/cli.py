@@ -94,6 +94,12 @@ def _parser() -> argparse.ArgumentParser:
         metavar="PAGE",
         help="write where the time of what runs goes, a flame graph in HTML",
     )
+    build.add_argument(
+        "--single-file",
+        action="store_true",
+        help="besides, for a colleague without tourgen, one self-contained HTML file a room or "
+        "tour, opened by a double click (its one inline script allowed by hash)",
+    )
     serve.add_argument("--port", type=_positive, default=8000, help="port (8000)")
     kiosk.add_argument("--port", type=_positive, default=8710, help="port (8710)")
     for command in (check, plan, build, doctor):
@@ -169,7 +175,8 @@ def _build(asked: argparse.Namespace) -> int:
 
     out = asked.output or str(asked.folder / OUTPUT)
     plain = not (asked.room or asked.cluster or asked.profile)
-    report = (plain and last_report(asked.folder, out)) or _built(asked, out)
+    last = last_report(asked.folder, out, single_files=asked.single_file) if plain else None
+    report = last or _built(asked, out)
     if asked.json:
         _print_json(report)
         return 0
@@ -181,6 +188,11 @@ def _build(asked: argparse.Namespace) -> int:
         f"{report['ran_stages']} stages run, {report['cached_stages']} from the cache, "
         f"{report['seconds']:.1f} s"
     )
+    singles = report.get("single_files", {"warnings": [], "bytes": {}})
+    for warning in singles["warnings"]:
+        print(f"warning: {warning}")
+    for path, size in singles["bytes"].items():
+        print(f"single file {out.rstrip('/')}/{path}: {size / 1e6:.1f} MB")
     if "://" not in out:
         print(f"to walk through it: tourgen serve {out if asked.output else asked.folder}")
     return 0
@@ -207,6 +219,7 @@ def _built(asked: argparse.Namespace, out: str) -> Any:
             jobs=asked.jobs,
             cluster=asked.cluster,
             profile=asked.profile,
+            single_files=asked.single_file,
         )
 
 

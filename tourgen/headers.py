@@ -7,7 +7,9 @@ the tour in a frame of their page: there is nothing in it that a visitor could b
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import mimetypes
+from collections.abc import Mapping, Sequence
+from pathlib import PurePath
 from typing import Final
 
 _POLICY: Final[Mapping[str, str]] = {
@@ -25,8 +27,34 @@ _POLICY: Final[Mapping[str, str]] = {
     "frame-ancestors": "*",
 }
 
+_TYPES: Final = {
+    ".css": "text/css; charset=utf-8",
+    ".glb": "model/gltf-binary",
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+    ".m4a": "audio/mp4",
+    ".mp3": "audio/mpeg",
+    ".ogg": "audio/ogg",
+    ".otf": "font/otf",
+    ".svg": "image/svg+xml",
+    ".ttf": "font/ttf",
+    ".vtt": "text/vtt; charset=utf-8",
+    ".wasm": "application/wasm",
+    ".wav": "audio/wav",
+    ".webmanifest": "application/manifest+json",
+    ".webp": "image/webp",
+    ".woff": "font/woff",
+    ".woff2": "font/woff2",
+}
+
+
+def _written(policy: Mapping[str, str]) -> str:
+    return "; ".join(f"{key} {value}" for key, value in policy.items())
+
+
 SECURITY_HEADERS: Final[Mapping[str, str]] = {
-    "Content-Security-Policy": "; ".join(f"{key} {value}" for key, value in _POLICY.items()),
+    "Content-Security-Policy": _written(_POLICY),
     "Cross-Origin-Opener-Policy": "same-origin",
     "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
     "Referrer-Policy": "strict-origin-when-cross-origin",
@@ -39,6 +67,37 @@ REVALIDATED: Final = "no-cache"
 
 IMMUTABLE: Final = "public, max-age=31536000, immutable"
 """``Cache-Control`` of ``viewer/``, whose names carry their digest."""
+
+
+def content_type(name: str) -> str:
+    """What a file holds, by its name: by our own table first, a machine's may lack newer ones."""
+    suffix = PurePath(name).suffix.lower()
+    return _TYPES.get(suffix) or mimetypes.types_map.get(suffix, "application/octet-stream")
+
+
+def carried_policy(scripts: Sequence[str], styles: Sequence[str]) -> str:
+    """The policy of a page that carries all it shows, for its ``meta`` element.
+
+    Args:
+        scripts: SHA-256 digests of those that may run, in Base64.
+        styles: The same of style sheets.
+    """
+
+    def allowed(digests: Sequence[str]) -> str:
+        return " ".join(f"'sha256-{digest}'" for digest in digests)
+
+    policy = {
+        **_POLICY,
+        "script-src": f"{allowed(scripts)} 'wasm-unsafe-eval'",
+        "worker-src": "blob:",
+        "connect-src": "blob: data:",
+        "img-src": "blob: data:",
+        "media-src": "data:",
+        "style-src": allowed(styles),
+        "font-src": "data:",
+    }
+    del policy["frame-ancestors"]  # has no meaning there
+    return _written(policy)
 
 
 def headers_file() -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import http.server
-import mimetypes
 import re
 import shutil
 from collections.abc import Callable
@@ -15,7 +14,7 @@ from socketserver import ThreadingMixIn
 from typing import TYPE_CHECKING, BinaryIO, Final
 
 from tourgen.errors import InputError, StageError
-from tourgen.headers import IMMUTABLE, REVALIDATED, SECURITY_HEADERS
+from tourgen.headers import IMMUTABLE, REVALIDATED, SECURITY_HEADERS, content_type
 from tourgen.site import is_site, restore_site
 
 if TYPE_CHECKING:
@@ -23,25 +22,6 @@ if TYPE_CHECKING:
 
 PORTS_TRIED: Final = 20
 
-_TYPES: Final = {
-    ".css": "text/css; charset=utf-8",
-    ".glb": "model/gltf-binary",
-    ".html": "text/html; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".json": "application/json",
-    ".m4a": "audio/mp4",
-    ".mp3": "audio/mpeg",
-    ".ogg": "audio/ogg",
-    ".otf": "font/otf",
-    ".svg": "image/svg+xml",
-    ".ttf": "font/ttf",
-    ".vtt": "text/vtt; charset=utf-8",
-    ".wasm": "application/wasm",
-    ".wav": "audio/wav",
-    ".webp": "image/webp",
-    ".woff": "font/woff",
-    ".woff2": "font/woff2",
-}
 _RANGE: Final = re.compile(r"bytes=(\d*)-(\d*)")
 
 
@@ -129,8 +109,7 @@ class TourHandler(http.server.SimpleHTTPRequestHandler):
 
     def guess_type(self, path: object) -> str:
         """Types by our own table first: that of the machine may lack the newer ones."""
-        suffix = Path(str(path)).suffix.lower()
-        return _TYPES.get(suffix) or mimetypes.types_map.get(suffix, "application/octet-stream")
+        return content_type(str(path))
 
     def end_headers(self) -> None:
         """With the headers that every file of a tour is sent with."""

@@ -41,8 +41,14 @@ def forget_build(folder: Path) -> None:
     (folder / _NOTE).unlink(missing_ok=True)
 
 
-def last_report(folder: Path, out: str) -> dict[str, Any] | None:
-    """The report of the last build, of which every stage is in the cache; None: build again."""
+def last_report(folder: Path, out: str, *, single_files: bool = False) -> dict[str, Any] | None:
+    """The report of the last build, of which every stage is in the cache; None: build again.
+
+    Args:
+        folder: The tour's.
+        out: The site's.
+        single_files: Whether the site shall hold the tour and each room as one file, too.
+    """
     try:
         note = json.loads((folder / _NOTE).read_text(encoding="utf-8"))
         if note["out"] != str(Path(out).resolve()):
@@ -51,6 +57,8 @@ def last_report(folder: Path, out: str) -> dict[str, Any] | None:
             return None
         report: dict[str, Any] = json.loads((Path(out) / "report.json").read_text(encoding="utf-8"))
     except (OSError, ValueError, KeyError):
+        return None
+    if ("single_files" in report) != single_files:
         return None
     report["cached_stages"] += report["ran_stages"]
     report |= {"ran_stages": 0, "seconds": 0.0}

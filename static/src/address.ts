@@ -1,6 +1,8 @@
 /**
- * Rooms, views and their addresses: `rooms/ID/index.html#at=x,y,z,yaw,pitch` below the site's
- * folder, whatever its path. Metres and degrees; the mode one looks in stands there too.
+ * Rooms, views and their addresses. On a server a room has a page of its own,
+ * `rooms/ID/index.html?lang=fr#at=x,y,z,yaw,pitch` below the site's folder, whatever its path; in a
+ * single file all stands behind the `#`, the only part that a page may change which lies on a disk:
+ * `#room=ID&lang=fr&at=x,y,z,yaw,pitch`. Metres and degrees; how one sees stands there, too.
  */
 
 import type { Triple, View } from "./tour.ts";
@@ -19,20 +21,107 @@ export interface Place {
   readonly note: number | null;
 }
 
-/** The address of a room's page; what the present address asks for (`?...`) goes along. */
-export function roomAddress(site: URL, id: string, search = "", place?: Place): string {
-  const url = new URL(`rooms/${encodeURIComponent(id)}/index.html`, site);
-  url.search = search;
-  if (place) url.hash = hashOf(place);
+/** How an address names rooms. What `here`, the present one, asks for beside that goes along. */
+export interface Addresses {
+  /** The room that an address names, or null where it names none. */
+  roomAt(here: URL): string | null;
+  /** The language that it asks for, or null. */
+  languageAt(here: URL): string | null;
+  /** Of a room, and of a place in it. */
+  ofRoom(here: URL, id: string, place?: Place): string;
+  /** Of a place in the room that `here` names. */
+  ofPlace(here: URL, place: Place): string;
+  inLanguage(here: URL, language: string): string;
+  /** What others find a place by; null: nothing. `published`: where the tour says that it lies. */
+  forOthers(here: URL, published: string | null, id: string, place: Place): string | null;
+}
+
+/** Of rooms that have pages below a site's folder. */
+export class PathAddresses implements Addresses {
+  readonly #site: URL;
+
+  constructor(site: URL) {
+    this.#site = site;
+  }
+
+  roomAt({ pathname }: URL): string | null {
+    if (!pathname.startsWith(this.#site.pathname)) return null;
+    const match = ROOM_PATH.exec(pathname.slice(this.#site.pathname.length));
+    return match?.[1] === undefined ? null : decodeURIComponent(match[1]);
+  }
+
+  languageAt(here: URL): string | null {
+    return here.searchParams.get("lang");
+  }
+
+  ofRoom(here: URL, id: string, place?: Place): string {
+    const url = new URL(`rooms/${encodeURIComponent(id)}/index.html`, this.#site);
+    url.search = here.search;
+    if (place) url.hash = hashOf(place);
+    return url.href;
+  }
+
+  ofPlace(here: URL, place: Place): string {
+    const url = new URL(here);
+    url.hash = hashOf(place);
+    return url.href;
+  }
+
+  inLanguage(here: URL, language: string): string {
+    const url = new URL(here);
+    url.searchParams.set("lang", language);
+    return url.href;
+  }
+
+  forOthers(here: URL, _published: string | null, id: string, place: Place): string {
+    return this.ofRoom(here, id, place);
+  }
+}
+
+/** Of rooms that one page holds. */
+export class FragmentAddresses implements Addresses {
+  roomAt(here: URL): string | null {
+    return askedBehind(here).get("room");
+  }
+
+  languageAt(here: URL): string | null {
+    return askedBehind(here).get("lang");
+  }
+
+  ofRoom(here: URL, id: string, place?: Place): string {
+    return written(here, id, this.languageAt(here), place ? hashOf(place) : "");
+  }
+
+  ofPlace(here: URL, place: Place): string {
+    return written(here, this.roomAt(here), this.languageAt(here), hashOf(place));
+  }
+
+  inLanguage(here: URL, language: string): string {
+    return written(here, this.roomAt(here), language, hashOf(placeIn(here.hash)));
+  }
+
+  forOthers(here: URL, published: string | null, id: string, place: Place): string | null {
+    if (published === null) return null; // nobody else has this disk
+    const page = new URL(published);
+    const language = this.languageAt(here);
+    if (language !== null) page.searchParams.set("lang", language);
+    return new PathAddresses(new URL(published)).ofRoom(page, id, place);
+  }
+}
+
+function written(here: URL, room: string | null, language: string | null, place: string): string {
+  const url = new URL(here);
+  const parts = [
+    room === null ? "" : `room=${encodeURIComponent(room)}`,
+    language === null ? "" : `lang=${encodeURIComponent(language)}`,
+    place,
+  ];
+  url.hash = parts.filter((part) => part !== "").join("&");
   return url.href;
 }
 
-/** The room that an address names, or null where it is the tour's own page. */
-export function roomAt(site: URL, address: string): string | null {
-  const path = new URL(address).pathname;
-  if (!path.startsWith(site.pathname)) return null;
-  const match = ROOM_PATH.exec(path.slice(site.pathname.length));
-  return match?.[1] === undefined ? null : decodeURIComponent(match[1]);
+function askedBehind({ hash }: URL): URLSearchParams {
+  return new URLSearchParams(hash.replace(/^#/, ""));
 }
 
 /** The part behind `#` that says a place. */

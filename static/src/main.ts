@@ -1,82 +1,9 @@
-/** The viewer's entry: reads what the page says, opens its room, or shows the plain page. */
+/** The entry of a published page: what it shows lies beside it, on its server. */
 
-import { takeAlongInTime } from "./along/along.ts";
-import { element } from "./dom.ts";
-import { kioskSettings } from "./kiosk/settings.ts";
-import { fetchTour, roomCalled, startOf } from "./tour.ts";
-import { chooseLanguage, wordsIn } from "./words.ts";
+import { PathAddresses } from "./address.ts";
+import { SiteFiles } from "./files.ts";
+import { hostIn, open } from "./open.ts";
 
-/** The decoder's folder beside this script; the bundler fills it in. */
-declare const DRACO_FOLDER: string;
-
-const PATIENCE_MS = 500;
-
-async function main(): Promise<void> {
-  const host = document.getElementById("tour");
-  if (!host) throw new Error("page: expected an element with id `tour`, found none");
-  const site = new URL(host.dataset["site"] || "./", location.href);
-  const words = wordsIn(chooseLanguage(["en", "fr"], navigator.languages));
-  if (!canDraw()) return showPlain(host, words.noWebgl);
-  let tour;
-  try {
-    tour = await fetchTour(new URL("tour.json", site));
-  } catch (error) {
-    console.warn(error);
-    showPlain(host, words.noTour, words.retry);
-    return;
-  }
-  keepIcon();
-  await quiet(host);
-  const decoder = new URL(DRACO_FOLDER, import.meta.url);
-  const asked = roomCalled(tour, host.dataset["room"] ?? null);
-  const room = asked ?? startOf(tour);
-  const told = host.dataset["kiosk"];
-  if (told !== undefined) {
-    const { openKiosk } = await import("./kiosk/open.ts");
-    return openKiosk(host, site, decoder, tour, room, kioskSettings(told));
-  }
-  const { Visit } = await import("./visit.ts");
-  const manner = { kiosk: false, opened: () => undefined, home: () => undefined };
-  new Visit(host, site, decoder, tour, room, manner).start(asked === null);
-  takeAlongInTime(site, tour);
-}
-
-/** The page's address will change with the rooms; what it names relatively must not. */
-function keepIcon(): void {
-  const icon = document.querySelector<HTMLLinkElement>("link[rel=icon]");
-  if (icon) icon.href = new URL(icon.href).href;
-}
-
-/** Waits until the page stands and nothing else is to be done, or the visitor asks for the room. */
-function quiet(host: HTMLElement): Promise<void> {
-  return new Promise((done) => {
-    const start = (): void => done();
-    for (const asked of ["pointerdown", "keydown", "focusin"]) {
-      host.ownerDocument.addEventListener(asked, start, { once: true, passive: true });
-    }
-    const idle = (): void => {
-      if ("requestIdleCallback" in window) requestIdleCallback(start, { timeout: PATIENCE_MS });
-      else setTimeout(start, 0); // Safari
-    };
-    if (document.readyState === "complete") idle();
-    else window.addEventListener("load", idle, { once: true });
-  });
-}
-
-function canDraw(): boolean {
-  return document.createElement("canvas").getContext("webgl2") !== null;
-}
-
-/** Shows the page's own pictures and texts under a line that says why. */
-function showPlain(host: HTMLElement, message: string, retry?: string): void {
-  document.documentElement.classList.add("without-room");
-  const notice = element("div", { class: "notice grave", role: "alert" }, element("p", {}, message));
-  if (retry !== undefined) {
-    const button = element("button", { type: "button", class: "plain-button" }, retry);
-    button.addEventListener("click", () => location.reload());
-    notice.append(button);
-  }
-  host.append(notice);
-}
-
-await main();
+const host = hostIn(document);
+const site = new URL(host.dataset["site"] || "./", location.href);
+await open(host, new SiteFiles(site), new PathAddresses(site));

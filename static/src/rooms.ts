@@ -3,6 +3,7 @@
 import type { LoadingManager } from "three";
 import type { Collider } from "./walk/collider.ts";
 import { isTouch, pause, prefersStillness } from "./dom.ts";
+import type { Files } from "./files.ts";
 import type { Frontend } from "./page/frontend.ts";
 import type { Action } from "./page/notice.ts";
 import type { Levels } from "./scene/levels.ts";
@@ -25,7 +26,7 @@ export interface RoomsEvents {
 }
 
 export class Rooms {
-  readonly #site: URL;
+  readonly #files: Files;
   readonly #tour: Tour;
   readonly #stage: Stage;
   readonly #front: Frontend;
@@ -41,7 +42,7 @@ export class Rooms {
   #entered = 0;
 
   constructor(
-    site: URL,
+    files: Files,
     tour: Tour,
     room: Room,
     stage: Stage,
@@ -50,7 +51,7 @@ export class Rooms {
     levels: Levels,
     events: RoomsEvents,
   ) {
-    this.#site = site;
+    this.#files = files;
     this.#tour = tour;
     this.#room = room;
     this.#stage = stage;
@@ -58,7 +59,7 @@ export class Rooms {
     this.#decoder = decoder;
     this.#levels = levels;
     this.#events = events;
-    this.#prefetch = new Prefetch(site, tour);
+    this.#prefetch = new Prefetch(files, tour);
   }
 
   /** The one that one is in, or on the way to. */
@@ -111,9 +112,14 @@ export class Rooms {
     levels: Levels,
     events: ConstructorParameters<typeof RoomTiles>[1],
   ): RoomTiles {
-    const tileset = new URL(room.tileset, this.#site);
-    const { camera } = this.#stage;
-    const options = { tileset, decoder: this.#decoder, camera, levels, phone: isTouch() };
+    const options = {
+      files: this.#files,
+      tileset: room.tileset,
+      decoder: this.#decoder,
+      camera: this.#stage.camera,
+      levels,
+      phone: isTouch(),
+    };
     return new RoomTiles(options, events);
   }
 

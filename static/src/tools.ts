@@ -18,9 +18,10 @@ export interface ToolsHost {
   readonly rooms: Rooms;
   /** Where nothing is saved, sent or worn. */
   readonly kiosk: boolean;
-  readonly site: URL;
-  /** Of the present view. */
-  address(): string;
+  /** Where the tour can be taken along from; null where it cannot. */
+  readonly home: URL | null;
+  /** Of the present view; null where it has none that others could use. */
+  address(): string | null;
   /** Shows the room in a headset. */
   immerse(): void;
   /** Goes to a room, or to a note of it. */
@@ -76,11 +77,11 @@ export class Tools {
       { name: words.tint, drawing: "tint", isOn: this.#isTinted, act: () => this.#toggleTint() },
     ];
     if (this.#host.kiosk) return tools;
-    tools.push(
-      { name: words.picture, drawing: "camera", act: () => this.#takePicture() },
-      { name: words.share, drawing: "share", act: () => void this.#share() },
-    );
-    if (canTakeAlong()) {
+    tools.push({ name: words.picture, drawing: "camera", act: () => this.#takePicture() });
+    if (this.#host.address() !== null) {
+      tools.push({ name: words.share, drawing: "share", act: () => void this.#share() });
+    }
+    if (this.#host.home && canTakeAlong()) {
       const size = new Intl.NumberFormat(mannerOf(this.#host.front.language), {
         style: "unit",
         unit: "megabyte",
@@ -221,13 +222,16 @@ export class Tools {
 
   async #share(): Promise<void> {
     const { front } = this.#host;
+    const address = this.#host.address();
+    if (address === null) return;
     const { shareSheet } = await import("./modes/share.ts");
-    front.panel.open(front.words.share, shareSheet(front.title, this.#host.address(), front.words));
+    front.panel.open(front.words.share, shareSheet(front.title, address, front.words));
   }
 
   async #takeAlong(): Promise<void> {
-    const { front, site } = this.#host;
+    const { front, home } = this.#host;
     const { words } = front;
+    if (!home) return;
     front.panel.close();
     const share = new Intl.NumberFormat(mannerOf(front.language), { style: "percent" });
     const close = [{ label: words.close, act: (): void => undefined }];
@@ -235,7 +239,7 @@ export class Tools {
       front.notice.tell(words.takingAlong.replace("{}", share.format(part)), []);
     try {
       progress(0);
-      await takeAlong(site, progress);
+      await takeAlong(home, progress);
       front.notice.tell(words.along, close);
     } catch (error) {
       console.warn(error);

@@ -1,5 +1,7 @@
 /** What tour.json says. Coordinates are metres in the room's frame, z up. */
 
+import type { Files } from "./files.ts";
+
 export type Triple = readonly [number, number, number];
 export type Texts = Readonly<Record<string, string>>;
 
@@ -88,6 +90,8 @@ export interface Tour {
   readonly title: Texts;
   readonly languages: readonly string[];
   readonly start: string;
+  /** Where it is published, if that is known. */
+  readonly address: string | null;
   /** Counter-clockwise from the building's x axis; null where it is not known. */
   readonly north_deg: number | null;
   /** HTML. */
@@ -100,9 +104,9 @@ export interface Tour {
 
 const FORMAT = 2;
 
-/** Reads tour.json at `url`. Throws an Error that says in one line what is wrong. */
-export async function fetchTour(url: URL): Promise<Tour> {
-  const response = await fetch(url);
+/** Reads tour.json. Throws an Error that says in one line what is wrong. */
+export async function fetchTour(files: Files): Promise<Tour> {
+  const response = await files.fetch(files.locate("tour.json"));
   if (!response.ok) throw new Error(`tour.json: the server answered ${response.status}`);
   const tour = (await response.json()) as Tour;
   if (tour.format !== FORMAT) {

@@ -1,10 +1,11 @@
 /** A visit: one way of seeing after the other, room after room, and the loop that shows it all. */
 
 import { Vector3, type LoadingManager, type Raycaster } from "three";
-import { hashOf, placeIn, roomAddress, roomAt, type Place, type Way } from "./address.ts";
+import { placeIn, type Addresses, type Place, type Way } from "./address.ts";
 import type { Hit } from "./walk/collider.ts";
 import { readQuery, type Diagnostics } from "./diagnostics.ts";
 import { prefersStillness } from "./dom.ts";
+import type { Files } from "./files.ts";
 import { Frontend } from "./page/frontend.ts";
 import { PlanSheet } from "./page/plan-sheet.ts";
 import { Tools } from "./tools.ts";
@@ -62,7 +63,7 @@ export interface Manner {
 export class Visit {
   readonly front: Frontend;
   readonly #manner: Manner;
-  readonly #site: URL;
+  readonly #addresses: Addresses;
   readonly #tour: Tour;
   readonly #stage: Stage;
   readonly #query = readQuery(location.search);
@@ -86,22 +87,19 @@ export class Visit {
 
   constructor(
     host: HTMLElement,
-    site: URL,
-    decoder: URL,
+    files: Files,
+    addresses: Addresses,
     tour: Tour,
     room: Room,
     manner: Manner,
   ) {
-    this.#site = site;
+    this.#addresses = addresses;
     this.#tour = tour;
     this.#manner = manner;
-    const wishes = [
-      new URLSearchParams(location.search).get("lang"),
-      chosenLanguage(),
-      ...navigator.languages,
-    ];
+    const asked = addresses.languageAt(new URL(location.href));
+    const wishes = [asked, chosenLanguage(), ...navigator.languages];
     const language = manner.kiosk ? firstOf(tour) : chooseLanguage(tour.languages, wishes);
-    this.front = new Frontend(host, site, tour, room, language, manner.kiosk, {
+    this.front = new Frontend(host, files, addresses, tour, room, language, manner.kiosk, {
       door: (link) => this.#walkThrough(link),
       reached: (at) => this.#act(() => this.#visitor.face(new Vector3(...at))),
       chosen: (next) => this.#go(next, next.entry),
@@ -117,9 +115,9 @@ export class Visit {
     const canvas = this.front.canvas;
     this.#stage = new Stage(canvas, this.#query.background, (dt) => this.#frame(dt));
     this.#stage.scene.add(this.#marker.group);
-    const manager: LoadingManager = tileDecoder(decoder);
+    const manager: LoadingManager = tileDecoder(files);
     this.#rooms = new Rooms(
-      site,
+      files,
       tour,
       room,
       this.#stage,
@@ -164,7 +162,7 @@ export class Visit {
       front: this.front,
       rooms: this.#rooms,
       kiosk: manner.kiosk,
-      site,
+      home: files.home,
       address: () => this.#address(),
       immerse: () => void this.#immerse(),
       open: (of, note) => (note ? this.#open(of, note, true) : this.#go(of, of.entry)),
@@ -272,7 +270,7 @@ export class Visit {
   #go(room: Room, view: View, then: (() => void) | null = null): void {
     this.#noteView();
     if (!this.#manner.kiosk) {
-      history.pushState(null, "", roomAddress(this.#site, room.id, location.search));
+      history.pushState(null, "", this.#addresses.ofRoom(new URL(location.href), room.id));
     }
     this.#leaveWay();
     this.#then = then;
@@ -281,7 +279,8 @@ export class Visit {
 
   /** Goes where the address says, after a step through the history or by hand. */
   #follow(): void {
-    const room = roomCalled(this.#tour, roomAt(this.#site, location.href)) ?? startOf(this.#tour);
+    const named = this.#addresses.roomAt(new URL(location.href));
+    const room = roomCalled(this.#tour, named) ?? startOf(this.#tour);
     const place = placeIn(location.hash);
     if (room !== this.#rooms.room || !this.#rooms.isOpen) this.#enter(room, place, true);
     else {
@@ -297,8 +296,8 @@ export class Visit {
   #noteView(): void {
     clearTimeout(this.#rest);
     if (!this.#rooms.isOpen || this.#manner.kiosk) return;
-    const hash = hashOf(this.#place());
-    if (`#${hash}` !== location.hash) history.replaceState(history.state, "", `#${hash}`);
+    const address = this.#addresses.ofPlace(new URL(location.href), this.#place());
+    if (address !== location.href) history.replaceState(history.state, "", address);
   }
 
   #place(): Place {
@@ -306,8 +305,10 @@ export class Visit {
     return { view: this.#view(), way: this.#way, note: note > 0 ? note : null };
   }
 
-  #address(): string {
-    return roomAddress(this.#site, this.#rooms.room.id, location.search, this.#place());
+  #address(): string | null {
+    const here = new URL(location.href);
+    const { id } = this.#rooms.room;
+    return this.#addresses.forOthers(here, this.#tour.address, id, this.#place());
   }
 
   #tell(message: string): void {
@@ -516,9 +517,8 @@ export class Visit {
 
   #keepLanguage(language: string): void {
     chooseLanguageForGood(language);
-    const url = new URL(location.href);
-    url.searchParams.set("lang", language);
-    history.replaceState(history.state, "", url);
+    const address = this.#addresses.inLanguage(new URL(location.href), language);
+    history.replaceState(history.state, "", address);
   }
 
   // ------------------------------------------------------------------ the loop

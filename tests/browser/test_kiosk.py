@@ -283,8 +283,10 @@ def test_a_lost_graphics_context_comes_back_or_the_page_begins_anew(kiosk: Kiosk
     assert here.page.evaluate("window.first")
     assert state(here.page) == "attract"
     here.page.evaluate("window.lost.loseContext()")
-    leave_alone(here, 8)
-    here.wait("!window.first && window.tourgen?.ready")
+    with here.page.expect_navigation():
+        leave_alone(here, 8)
+    here.wait("window.tourgen?.ready")
+    assert not here.page.evaluate("window.first ?? false")
     assert state(here.page) == "attract"
 
 

@@ -203,6 +203,30 @@ def test_what_is_asked_of_an_untouched_tour_is_still_done(
     assert last_report(box_copy, str(box_copy / "site"))
 
 
+def test_single_files_are_made_of_an_untouched_tour_where_they_are_missing(
+    box_copy: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told(capsys, "build", str(box_copy))
+    before = published_files(box_copy / "site")
+    report = told(capsys, "build", str(box_copy), "--single-file")
+    assert report["ran_stages"] == 0
+    assert sorted(report["single_files"]["bytes"]) == [
+        "single/rooms/left.html",
+        "single/rooms/right.html",
+        "single/tour.html",
+    ]
+    assert last_report(box_copy, box_copy / "site", single_files=True), "they are there now"
+    assert main(["build", str(box_copy), "--single-file"]) == 0
+    told_lines = capsys.readouterr().out.splitlines()
+    size = (box_copy / "site/single/tour.html").stat().st_size / 1e6
+    assert f"single file {box_copy}/site/single/tour.html: {size:.1f} MB" in told_lines
+    (box_copy / "site/single/tour.html").unlink()
+    told(capsys, "build", str(box_copy), "--single-file")
+    assert (box_copy / "site/single/tour.html").is_file()
+    assert "single_files" not in told(capsys, "build", str(box_copy))
+    assert published_files(box_copy / "site") == before
+
+
 def test_a_disk_that_fills_is_one_clear_line(box_copy: Path, tmp_path: Path) -> None:
     """On a file system of its own, too small for the cache; with room, the build goes on."""
     before = published_files(box_copy / "site")

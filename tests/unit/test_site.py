@@ -153,12 +153,15 @@ def viewer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dist = tmp_path / "dist"
     (dist / "draco-1").mkdir(parents=True)
     names = {"script": "viewer-1.js", "style": "style-1.css", "draco": "draco-1/"}
-    names_too = {"icon": "icon.svg", "soon": ["visit-1.js"]}
+    names_too = {"icon": "icon.svg", "soon": ["visit-1.js"], "kiosk": "kiosk-1.css"}
     (dist / "manifest.json").write_text(json.dumps(names | names_too))
     for name in (
         "viewer-1.js",
         "visit-1.js",
+        "single.js",
         "style-1.css",
+        "kiosk-1.css",
+        "sw.js",
         "icon.svg",
         "draco-1/draco_decoder.wasm",
     ):
@@ -213,6 +216,7 @@ def test_every_address_is_relative_and_leads_to_a_file(tour: Tour, tmp_path: Pat
     assert [str(page.relative_to(out)) for page in pages] == [
         "404.html",
         "index.html",
+        "kiosk.html",
         "report.html",
         "rooms/hall/index.html",
         "rooms/loft/index.html",
@@ -319,6 +323,21 @@ def test_the_report_is_set_as_a_page(tour: Tour, tmp_path: Path) -> None:
     for expected in ("1\u202f302\u202f317", "250\u202f000", "1.31", "4.92", "3.1", "31.5", "1900"):
         assert expected in page, expected
     assert "a&lt;b&gt;.ply" in page
+
+
+def test_single_files_come_with_the_site_where_they_are_asked_for(
+    tour: Tour, tmp_path: Path
+) -> None:
+    out = tmp_path / "site"
+    rooms = [built("loft", 0), built("hall", 1)]
+    report = write_site(tour, rooms, REPORT, out, single_files=True)
+    assert json.loads((out / "report.json").read_text("utf-8")) == report
+    sizes = report["single_files"]["bytes"]
+    assert list(sizes) == ["single/tour.html", "single/rooms/hall.html", "single/rooms/loft.html"]
+    assert {name: (out / name).stat().st_size for name in sizes} == sizes
+    assert not (out / "viewer/single.js").exists(), "no page asks for it"
+    assert write_site(tour, rooms, REPORT, out) == REPORT
+    assert not (out / "single").exists()
 
 
 def test_a_site_takes_the_place_of_the_one_before_whole(tour: Tour, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { hashOf, placeIn, roomAddress } from "../../static/src/address.ts";
+import { FragmentAddresses, hashOf, PathAddresses, placeIn } from "../../static/src/address.ts";
+import { CarriedFiles } from "../../static/src/files.ts";
 import { Backoff } from "../../static/src/scene/backoff.ts";
 import { between, inBuilding } from "../../static/src/scene/place.ts";
 import type { View } from "../../static/src/tour.ts";
@@ -28,10 +29,54 @@ test("an address holds a view, a way to see and a note", () => {
     const told = vector(...(place.view?.look_at ?? [0, 0, 0])).sub(vector(...VIEW.position));
     near(told.normalize(), look, 0.002);
   }
+  const addresses = new PathAddresses(new URL("https://a.org/t/"));
   assert.equal(
-    roomAddress(new URL("https://a.org/t/"), "b", "?lang=fr", { view: null, way: "plan", note: null }),
+    addresses.ofRoom(new URL("https://a.org/t/?lang=fr"), "b", { view: null, way: "plan", note: null }),
     "https://a.org/t/rooms/b/index.html?lang=fr#see=plan",
   );
+});
+
+test("in a single file all of an address stands behind the #", () => {
+  const addresses = new FragmentAddresses();
+  const file = "file:///C:/my%20tours/tour.html";
+  const plan = { view: null, way: "plan", note: 2 } as const;
+  let here = new URL(file);
+  assert.equal(addresses.roomAt(here), null);
+  const go = (to: string): URL => (here = new URL(to));
+  assert.equal(go(addresses.ofPlace(here, plan)).href, `${file}#see=plan&note=2`);
+  assert.equal(go(addresses.ofRoom(here, "b")).href, `${file}#room=b`);
+  assert.equal(go(addresses.ofPlace(here, plan)).href, `${file}#room=b&see=plan&note=2`);
+  go(addresses.inLanguage(here, "fr"));
+  assert.equal(here.href, `${file}#room=b&lang=fr&see=plan&note=2`);
+  assert.equal(addresses.languageAt(here), "fr");
+  assert.equal(addresses.roomAt(here), "b");
+  assert.deepEqual(placeIn(here.hash), plan);
+  assert.equal(go(addresses.ofRoom(here, "c")).href, `${file}#room=c&lang=fr`);
+});
+
+test("others find a view of a single file where the tour is published, or nowhere", () => {
+  const here = new URL("file:///tour.html#room=b&lang=fr");
+  const place = { view: null, way: "walk", note: 1 } as const;
+  const told = (published: string | null): string | null =>
+    new FragmentAddresses().forOthers(here, published, "b", place);
+  assert.equal(told(null), null);
+  assert.equal(told("https://a.org/t/"), "https://a.org/t/rooms/b/index.html?lang=fr#note=1");
+});
+
+test("a page that carries its files gives them out by their paths", async () => {
+  const carrier = (file: string, src: string | null, textContent: string): Element =>
+    ({ textContent, getAttribute: (name: string) => (name === "src" ? src : file) }) as Element;
+  const all = [
+    carrier("rooms/a/tiles/r.glb", null, "data:model/gltf-binary;base64,Z2xURg=="),
+    carrier("rooms/a/poster.webp", "data:image/webp;base64,UklGRg==", ""),
+  ];
+  const files = new CarriedFiles({ querySelectorAll: () => all } as unknown as ParentNode);
+  const tile = new URL("tiles/r.glb", files.locate("rooms/a/tileset.json"));
+  const response = await files.fetch(tile);
+  assert.equal(response.headers.get("content-type"), "model/gltf-binary");
+  assert.equal(await response.text(), "glTF");
+  assert.equal(files.source("rooms/a/poster.webp"), "data:image/webp;base64,UklGRg==");
+  assert.equal((await files.fetch(files.locate("rooms/b/tileset.json"))).status, 404);
 });
 
 test("what an address says wrongly is left out", () => {

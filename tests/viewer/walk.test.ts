@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { roomAddress, roomAt } from "../../static/src/address.ts";
+import { PathAddresses } from "../../static/src/address.ts";
 import { Errand } from "../../static/src/walk/errand.ts";
 import { checkerboard } from "../../static/src/scene/levels.ts";
 import { Look, PITCH_MAX, wrap } from "../../static/src/walk/look.ts";
@@ -137,15 +137,19 @@ test("turns the short way round", () => {
 test("rooms have addresses under any path, and addresses rooms", () => {
   for (const base of ["https://a.org/", "https://a.org/x/t%20o/", "http://127.0.0.1:8000/tour/"]) {
     const site = new URL(base);
-    const address = roomAddress(site, "chamber1");
+    const addresses = new PathAddresses(site);
+    const address = addresses.ofRoom(site, "chamber1");
     assert.equal(address, `${base}rooms/chamber1/index.html`);
-    assert.equal(roomAt(site, address), "chamber1");
-    assert.equal(roomAt(site, `${base}rooms/chamber1/?lang=fr#x`), "chamber1");
-    assert.equal(roomAt(site, `${base}index.html`), null);
-    assert.equal(roomAt(site, base), null);
+    const roomAt = (path: string): string | null => addresses.roomAt(new URL(path, site));
+    assert.equal(roomAt(address), "chamber1");
+    assert.equal(roomAt("rooms/chamber1/?lang=fr#x"), "chamber1");
+    assert.equal(roomAt("index.html"), null);
+    assert.equal(roomAt(""), null);
+    const french = addresses.ofRoom(new URL("?lang=fr#at=1", site), "b");
+    assert.equal(french, `${base}rooms/b/index.html?lang=fr`);
   }
-  assert.equal(roomAddress(new URL("https://a.org/"), "b", "?lang=fr"), "https://a.org/rooms/b/index.html?lang=fr");
-  assert.equal(roomAt(new URL("https://a.org/x/"), "https://a.org/y/rooms/b/index.html"), null);
+  const below = new PathAddresses(new URL("https://a.org/x/"));
+  assert.equal(below.roomAt(new URL("https://a.org/y/rooms/b/index.html")), null);
 });
 
 test("speaks the first language that both know", () => {

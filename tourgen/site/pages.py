@@ -42,8 +42,8 @@ class Pages:
         self._kiosk = kiosk
         self._language: str = told["languages"][0]
 
-    def every(self, report: Json) -> Iterator[tuple[str, str]]:
-        """Path and content of each."""
+    def every(self) -> Iterator[tuple[str, str]]:
+        """Path and content of each but the report."""
         rooms = self._told["rooms"]
         start = next(room for room in rooms if room["id"] == self._told["start"])
         for room in rooms:
@@ -51,10 +51,13 @@ class Pages:
         yield "index.html", self._room(start, site="", is_start=True)
         yield "kiosk.html", self._page("kiosk.html", site="", room=start, kiosk=self._kiosk)
         yield "404.html", self._page("404.html", site=self._root or "../../")
-        yield "report.html", self._page("report.html", site="", report=report)
         if self._told["address"]:
             yield "sitemap.xml", self._page("sitemap.xml")
             yield "robots.txt", f"User-agent: *\nAllow: /\nSitemap: {self._at('sitemap.xml')}\n"
+
+    def report(self, report: Json) -> str:
+        """The page of the report."""
+        return self._page("report.html", site="", report=report)
 
     @property
     def _root(self) -> str | None:

@@ -20,13 +20,22 @@ from tourgen.site.described import described, note_files
 from tourgen.site.kiosk import code_of, kiosk_settings
 from tourgen.site.offline import ICONS, MANIFEST, WORKER, icon, icon_path, manifest, worker_script
 from tourgen.site.pages import Pages, viewer_folder
+from tourgen.site.single import write_singles
 from tourgen.tour import Tour
 from tourgen.tour.theme import load_theme
+
+_SINGLE = "single"
+"""Where single files lie in the site."""
+
+_SINGLE_SCRIPT = "single.js"
+"""The viewer in one script; single files hold it, pages do not ask for it."""
 
 Json = dict[str, Any]
 
 
-def write_site(tour: Tour, rooms: Sequence[BuiltRoom], report: Json, out: Path) -> None:
+def write_site(
+    tour: Tour, rooms: Sequence[BuiltRoom], report: Json, out: Path, *, single_files: bool = False
+) -> Json:
     """Write the whole site and put it in the place of the one published before.
 
     Args:
@@ -34,9 +43,14 @@ def write_site(tour: Tour, rooms: Sequence[BuiltRoom], report: Json, out: Path) 
         rooms: Every room of the tour, in any order.
         report: What goes into report.json and onto its page.
         out: The site's folder; made if it does not exist.
+        single_files: Whether it shall hold the tour and each room as one file, too.
+
+    Returns:
+        The report as it was written: with what single files there are.
 
     Raises:
         InputError: ``out`` holds something that is not a tour, or cannot be written.
+        Faults: The single file of a room would be larger than browsers open.
         MissingTool: The viewer has not been compiled.
     """
     out = out.absolute()
@@ -46,11 +60,17 @@ def write_site(tour: Tour, rooms: Sequence[BuiltRoom], report: Json, out: Path) 
     try:
         _remove(fresh)
         fresh.mkdir(parents=True)
-        _write_all(tour, {room.id: room for room in rooms}, report, fresh)
+        pages = _write_all(tour, {room.id: room for room in rooms}, fresh)
+        if single_files:
+            script = (viewer_folder() / _SINGLE_SCRIPT).read_text("utf-8")
+            report = {**report, "single_files": write_singles(fresh, script, fresh / _SINGLE)}
+        _write_json(fresh / "report.json", report)
+        _write(fresh / "report.html", pages.report(report))
         if out.exists():
             out.rename(old)
         fresh.rename(out)
         _remove(old)
+        return report
     except OSError as error:
         raise InputError(
             f"`{out}`: expected a folder that can be written, found: {error.strerror or error}",
@@ -102,15 +122,16 @@ def _remove(folder: Path) -> None:
 # ------------------------------------------------------------------ contents
 
 
-def _write_all(tour: Tour, built: Mapping[str, BuiltRoom], report: Json, out: Path) -> None:
+def _write_all(tour: Tour, built: Mapping[str, BuiltRoom], out: Path) -> Pages:
+    """Write all but the report; returns the tour's pages."""
     viewer = viewer_folder()
-    shutil.copytree(viewer, out / "viewer", ignore=shutil.ignore_patterns(WORKER))
+    left = shutil.ignore_patterns(WORKER, _SINGLE_SCRIPT)
+    shutil.copytree(viewer, out / "viewer", ignore=left)
     theme = load_theme(tour.folder)
     for name, content in theme.files.items():
         _write(out / name, content)
     told = {**described(tour, built), "logo": theme.logo}
     _write_json(out / "tour.json", told)
-    _write_json(out / "report.json", report)
     _write(out / "_headers", headers_file())
     for room in tour.rooms:
         folder = out / "rooms" / room.id
@@ -122,13 +143,15 @@ def _write_all(tour: Tour, built: Mapping[str, BuiltRoom], report: Json, out: Pa
     for address, name in kiosk["codes"].items():
         _write(out / name, code_of(address))
     names = json.loads((viewer / "manifest.json").read_bytes())
-    for name, page in Pages(tour.folder, told, theme, names, kiosk).every(report):
+    pages = Pages(tour.folder, told, theme, names, kiosk)
+    for name, page in pages.every():
         _write(out / name, page)
     for size in ICONS:
         _write(out / icon_path(size), icon(built[tour.start].files["poster.webp"], size))
     _write(out / MANIFEST, manifest(told))
     # Last, since it names all that is there.
     _write(out / WORKER, worker_script(out, (viewer / WORKER).read_text("utf-8")))
+    return pages
 
 
 def _write_json(path: Path, content: Json) -> None:

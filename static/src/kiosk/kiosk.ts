@@ -4,6 +4,7 @@
  */
 
 import { hasNews, takeAlong, takeOver, canTakeAlong } from "../along/along.ts";
+import type { Files } from "../files.ts";
 import type { Frontend } from "../page/frontend.ts";
 import type { Room, Tour } from "../tour.ts";
 import type { Visit } from "../visit.ts";
@@ -31,7 +32,7 @@ const CORNER_MS = 4000;
 
 export class Kiosk {
   readonly #host: HTMLElement;
-  readonly #site: URL;
+  readonly #files: Files;
   readonly #tour: Tour;
   readonly #settings: KioskSettings;
   readonly #visit: Visit;
@@ -49,15 +50,15 @@ export class Kiosk {
   #askedNews = performance.now();
   #isReloading = false;
 
-  constructor(host: HTMLElement, site: URL, tour: Tour, settings: KioskSettings, visit: Visit) {
+  constructor(host: HTMLElement, files: Files, tour: Tour, settings: KioskSettings, visit: Visit) {
     this.#host = host;
-    this.#site = site;
+    this.#files = files;
     this.#tour = tour;
     this.#settings = settings;
     this.#visit = visit;
     this.#front = visit.front;
-    this.#watch = Watch.isOn(location.search) ? new Watch(site) : null;
-    const logo = tour.logo === null ? null : new URL(tour.logo, site).href;
+    this.#watch = files.home && Watch.isOn(location.search) ? new Watch(files.home) : null;
+    const logo = tour.logo === null ? null : files.source(tour.logo);
     this.#start = new StartScreen(tour, logo, (language) => this.#begin(language));
     host.append(this.#start.element, this.#warning.element);
     host.classList.toggle("low", settings.low);
@@ -75,8 +76,9 @@ export class Kiosk {
   run(): void {
     setInterval(() => this.#tick(), TICK_MS);
     this.#attract();
-    if (canTakeAlong()) {
-      void takeAlong(this.#site).catch((error: unknown) => this.#faults.note(String(error)));
+    const { home } = this.#files;
+    if (home && canTakeAlong()) {
+      void takeAlong(home).catch((error: unknown) => this.#faults.note(String(error)));
     }
   }
 
@@ -160,9 +162,10 @@ export class Kiosk {
   /** A new version is taken over when it is here whole, and while nobody is. */
   async #update(): Promise<void> {
     this.#askedNews = performance.now();
-    if (!canTakeAlong() || !(await hasNews(this.#site))) return;
+    const { home } = this.#files;
+    if (!home || !canTakeAlong() || !(await hasNews(home))) return;
     if (this.#state !== "attract" && this.#state !== "asleep") return;
-    await takeOver(this.#site);
+    await takeOver(home);
     this.#reload();
   }
 
@@ -191,7 +194,7 @@ export class Kiosk {
 
   #showCode(address: string): void {
     const path = this.#settings.codes[address];
-    const picture = path === undefined ? null : new URL(path, this.#site).href;
+    const picture = path === undefined ? null : this.#files.source(path);
     const { words, panel } = this.#front;
     panel.open(words.kioskCode, ...codeSheet(address, picture, words));
   }

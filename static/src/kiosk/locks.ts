@@ -65,7 +65,10 @@ export function lock(page: Window, leave: (address: string) => void): void {
   page.open = () => null;
 }
 
-function isRefused(event: KeyboardEvent): boolean {
+type Pressed = Pick<KeyboardEvent, "key" | "ctrlKey" | "altKey" | "metaKey" | "shiftKey">;
+
+/** Whether a key does something in the browser, and nothing in the tour. */
+export function isRefused(event: Pressed): boolean {
   const modified = event.ctrlKey || event.altKey || event.metaKey;
   const tasks = event.shiftKey && event.key === "Escape"; // Chromium lists its own
   return modified || tasks || !KEYS.test(event.key);

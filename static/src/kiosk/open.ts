@@ -1,5 +1,7 @@
 /** Opens the tour as a kiosk. */
 
+import type { Addresses } from "../address.ts";
+import type { Files } from "../files.ts";
 import type { Room, Tour } from "../tour.ts";
 import { Visit } from "../visit.ts";
 import { Kiosk } from "./kiosk.ts";
@@ -7,18 +9,18 @@ import type { KioskSettings } from "./settings.ts";
 
 export function openKiosk(
   host: HTMLElement,
-  site: URL,
-  decoder: URL,
+  files: Files,
+  addresses: Addresses,
   tour: Tour,
   room: Room,
   settings: KioskSettings,
 ): void {
-  const visit: Visit = new Visit(host, site, decoder, tour, room, {
+  const visit: Visit = new Visit(host, files, addresses, tour, room, {
     kiosk: true,
     opened: (of) => kiosk.opened(of),
     home: () => kiosk.home(),
   });
-  const kiosk = new Kiosk(host, site, tour, settings, visit);
+  const kiosk = new Kiosk(host, files, tour, settings, visit);
   visit.start(false);
   kiosk.run();
 }

@@ -1,7 +1,8 @@
 /** All that stands over the picture: header, dock, cover, panel, messages, doors and notes. */
 
-import { roomAddress, type Way } from "../address.ts";
+import type { Addresses, Way } from "../address.ts";
 import { element, isTouch } from "../dom.ts";
+import type { Files } from "../files.ts";
 import type { Note, Room, Texts, Tour } from "../tour.ts";
 import { directionOf, textIn, wordsIn, type Words } from "../words.ts";
 import { Cover } from "./cover.ts";
@@ -45,7 +46,8 @@ export class Frontend {
   readonly #dock: Dock;
   readonly #told = element("p", { class: "unseen", role: "status" });
   readonly #host: HTMLElement;
-  readonly #site: URL;
+  readonly #files: Files;
+  readonly #addresses: Addresses;
   readonly #tour: Tour;
   readonly #events: FrontendEvents;
   #room: Room;
@@ -55,7 +57,8 @@ export class Frontend {
 
   constructor(
     host: HTMLElement,
-    site: URL,
+    files: Files,
+    addresses: Addresses,
     tour: Tour,
     room: Room,
     language: string,
@@ -63,7 +66,8 @@ export class Frontend {
     events: FrontendEvents,
   ) {
     this.#host = host;
-    this.#site = site;
+    this.#files = files;
+    this.#addresses = addresses;
     this.#tour = tour;
     this.#room = room;
     this.#events = events;
@@ -72,7 +76,7 @@ export class Frontend {
     this.cover = new Cover(host.querySelector("img") ?? element("img", { alt: "" }));
     this.panel = new Panel(() => events.closed());
     this.map = new MiniMap(tour, () => events.see("plan"));
-    const logo = tour.logo === null ? null : new URL(tour.logo, site).href;
+    const logo = tour.logo === null ? null : files.source(tour.logo);
     this.#header = new Header(logo, tour.languages, kiosk, {
       search: () => events.search(),
       rooms: () => this.#listRooms(),
@@ -124,7 +128,7 @@ export class Frontend {
     this.notice.clear();
     this.spots.show([]);
     this.#say();
-    const poster = new URL(room.poster, this.#site).href;
+    const poster = this.#files.source(room.poster);
     this.cover.show(poster, this.text(room.title), this.#words.loading, passing);
   }
 
@@ -166,7 +170,7 @@ export class Frontend {
   }
 
   openNote(note: Note): void {
-    const content = noteSheet(note, this.#site, this.#language, this.#words);
+    const content = noteSheet(note, this.#files, this.#language, this.#words);
     this.panel.open(this.text(note.title), ...content);
   }
 
@@ -195,8 +199,8 @@ export class Frontend {
       const isHere = room === this.#room;
       return {
         title: this.text(room.title),
-        href: roomAddress(this.#site, room.id, location.search),
-        poster: new URL(room.poster, this.#site).href,
+        href: this.#addresses.ofRoom(new URL(location.href), room.id),
+        poster: this.#files.source(room.poster),
         isHere,
         notes: room.notes.map((note) => ({
           title: this.text(note.title),

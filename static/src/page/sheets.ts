@@ -1,34 +1,35 @@
 /** What the panel shows: a note, the rooms, the tools, the keys, how the tour was made. */
 
 import { button, element, icon, ICONS } from "../dom.ts";
+import type { Files } from "../files.ts";
 import type { Note, Room, Tour } from "../tour.ts";
 import { mannerOf, textIn, type Words } from "../words.ts";
 import { prose } from "./panel.ts";
 
 /** A note's picture, text and sound. */
-export function noteSheet(note: Note, site: URL, language: string, words: Words): Node[] {
+export function noteSheet(note: Note, files: Files, language: string, words: Words): Node[] {
   const content: Node[] = [];
   if (note.image) {
-    const src = new URL(note.image, site).href;
+    const src = files.source(note.image);
     content.push(element("img", { src, alt: textIn(note.image_text, language) }));
   }
   content.push(prose(textIn(note.text, language)));
-  if (note.sound) content.push(soundOf(note, note.sound, site, language, words));
+  if (note.sound) content.push(soundOf(note, note.sound, files, language, words));
   return content;
 }
 
 /** A sound with its captions below it, as it goes. */
-function soundOf(note: Note, sound: string, site: URL, language: string, words: Words): Node {
+function soundOf(note: Note, sound: string, files: Files, language: string, words: Words): Node {
   const player = element("audio", {
     controls: true,
     preload: "none",
-    src: new URL(sound, site).href,
+    src: files.source(sound),
     "aria-label": words.sound,
   });
   const said = element("p", { class: "captions", "aria-live": "polite" });
   const file = note.captions[language] ?? Object.values(note.captions)[0];
   if (file) {
-    const src = new URL(file, site).href;
+    const src = files.source(file);
     const track = element("track", { kind: "captions", srclang: language, src, default: true });
     track.addEventListener("cuechange", () => {
       const cues = [...(track.track.activeCues ?? [])];

@@ -1,5 +1,6 @@
 /** Fetches the rooms next door ahead, so that a door opens at once. */
 
+import type { Files } from "../files.ts";
 import type { Room, Tour } from "../tour.ts";
 
 interface TilesetRoot {
@@ -7,12 +8,12 @@ interface TilesetRoot {
 }
 
 export class Prefetch {
-  readonly #site: URL;
+  readonly #files: Files;
   readonly #tour: Tour;
   readonly #done = new Set<string>();
 
-  constructor(site: URL, tour: Tour) {
-    this.#site = site;
+  constructor(files: Files, tour: Tour) {
+    this.#files = files;
     this.#tour = tour;
   }
 
@@ -30,12 +31,13 @@ export class Prefetch {
   /** Poster, tileset and root tile, into the browser's cache. A failure costs nothing. */
   async #room(room: Room): Promise<void> {
     try {
-      new Image().src = new URL(room.poster, this.#site).href;
-      const tileset = new URL(room.tileset, this.#site);
-      const response = await fetch(tileset, { priority: "low" });
+      new Image().src = this.#files.source(room.poster);
+      const tileset = this.#files.locate(room.tileset);
+      const response = await this.#files.fetch(tileset, { priority: "low" });
       const { root } = (await response.json()) as TilesetRoot;
       if (root.content) {
-        const tile = await fetch(new URL(root.content.uri, tileset), { priority: "low" });
+        const at = new URL(root.content.uri, tileset);
+        const tile = await this.#files.fetch(at, { priority: "low" });
         await tile.arrayBuffer();
       }
     } catch {

@@ -17,6 +17,7 @@ import {
 } from "three";
 import { DRACOLoader } from "three/addons/loaders/DRACOLoader.js";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import type { Files } from "../files.ts";
 import { Collider } from "../walk/collider.ts";
 import { Backoff } from "./backoff.ts";
 import { boxOf, checkerboard, type Levels } from "./levels.ts";
@@ -43,20 +44,25 @@ export interface RoomEvents {
 }
 
 export interface RoomTilesOptions {
-  readonly tileset: URL;
+  readonly files: Files;
+  /** Its path. */
+  readonly tileset: string;
   readonly decoder: LoadingManager;
   readonly camera: PerspectiveCamera;
   readonly levels: Levels;
   readonly phone: boolean;
 }
 
+/** The decoder's folder in that of the viewer; the bundler fills it in. */
+declare const DRACO_FOLDER: string;
+
 /** What every room's tiles are decoded with; made once. */
-export function tileDecoder(decoderFolder: URL): LoadingManager {
+export function tileDecoder(files: Files): LoadingManager {
   const manager = new LoadingManager();
   const draco = new DRACOLoader(manager);
   draco.setDecoderPath({
-    js: new URL("draco_wasm_wrapper.js", decoderFolder).href,
-    wasm: new URL("draco_decoder.wasm", decoderFolder).href,
+    js: files.source(`viewer/${DRACO_FOLDER}draco_wasm_wrapper.js`),
+    wasm: files.source(`viewer/${DRACO_FOLDER}draco_decoder.wasm`),
   });
   draco.preload();
   manager.addHandler(/\.glb$/, new GLTFLoader(manager).setDRACOLoader(draco));
@@ -65,6 +71,7 @@ export function tileDecoder(decoderFolder: URL): LoadingManager {
 
 export class RoomTiles {
   readonly #tiles: TilesRenderer;
+  readonly #files: Files;
   readonly #events: RoomEvents;
   readonly #pruned = new Map<Tile, Tile[]>();
   readonly #failed = new Set<Tile>();
@@ -75,11 +82,12 @@ export class RoomTiles {
   #bytes = 0;
 
   constructor(
-    { tileset, decoder, camera, levels, phone }: RoomTilesOptions,
+    { files, tileset, decoder, camera, levels, phone }: RoomTilesOptions,
     events: RoomEvents,
   ) {
+    this.#files = files;
     this.#events = events;
-    const tiles = new TilesRenderer(tileset.href);
+    const tiles = new TilesRenderer(files.locate(tileset).href);
     this.#tiles = tiles;
     tiles.manager = decoder;
     tiles.errorTarget = levels === "view" ? ERROR_TARGET_PX : 0;
@@ -196,7 +204,7 @@ export class RoomTiles {
 
   /** Counts what comes, and tells how much of the root tile is there. */
   async #fetch(url: string, init: RequestInit): Promise<ArrayBuffer | object> {
-    const response = await fetch(url, init);
+    const response = await this.#files.fetch(url, init);
     if (!response.ok) throw new Error(`${url}: the server answered ${response.status}`);
     if (this.#rootShown || !response.body || !url.endsWith(".glb")) {
       const data = await response.arrayBuffer();
