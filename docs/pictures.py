@@ -2,7 +2,8 @@
 
 ``python docs/pictures.py SITE [FOLDER]`` opens each room as one who comes through a door, in a
 window of a desktop and of a phone, and writes ``ROOM-desktop.webp`` and ``ROOM-phone.webp``; and
-``visit-MODE-desktop.webp`` and so on of the room that the tour starts in.
+``visit-MODE-desktop.webp`` and so on of the room that the tour starts in; and ``kiosk-STATE.webp``
+of a kiosk, and ``kiosk-STATE-upright.webp`` of one whose screen stands upright.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from visitor import CHROMIUM, Visitor
+from visitor import CHROMIUM, Visitor, visitor
 
 from tourgen.doctor import browser as find_browser
 from tourgen.serve import open_server
@@ -64,6 +65,8 @@ def main() -> None:
                 picture.save(
                     asked.folder / f"visit-{mode}-{window.name}.webp", quality=QUALITY, method=6
                 )
+        for state, picture in kiosks(chromium, server.address.rstrip("/")):
+            picture.save(asked.folder / f"kiosk-{state}.webp", quality=QUALITY, method=6)
         chromium.close()
         server.shutdown()
 
@@ -79,13 +82,13 @@ def pictures(
             is_mobile=window.touch,
             has_touch=window.touch,
         )
-        visitor = Visitor(context.new_page(), origin)
-        visitor.open(f"rooms/{room['id']}/index.html")
-        visitor.teleport(**_view(tour, room))
-        yield room["id"], _shot(visitor.page)
+        here = Visitor(context.new_page(), origin)
+        here.open(f"rooms/{room['id']}/index.html")
+        here.teleport(**_view(tour, room))
+        yield room["id"], _shot(here.page)
         context.close()
-        if visitor.faults:
-            sys.exit("\n".join(visitor.faults))
+        if here.faults:
+            sys.exit("\n".join(here.faults))
 
 
 def _tool(page: Page, name: str) -> None:
@@ -131,17 +134,61 @@ def modes(chromium: Browser, origin: str, window: Window) -> Iterator[tuple[str,
             color_scheme="light",
             locale="en",
         )
-        visitor = Visitor(context.new_page(), origin)
-        visitor.open("index.html")
-        visitor.settle()
-        act(visitor.page)
-        visitor.page.wait_for_timeout(1500)
+        here = Visitor(context.new_page(), origin)
+        here.open("index.html")
+        here.settle()
+        act(here.page)
+        here.page.wait_for_timeout(1500)
         if mode != "guide":  # it goes on
-            visitor.settle()
-        yield mode, _shot(visitor.page)
+            here.settle()
+        yield mode, _shot(here.page)
         context.close()
-        if visitor.faults:
-            sys.exit("\n".join(visitor.faults))
+        if here.faults:
+            sys.exit("\n".join(here.faults))
+
+
+def _serviced(page: Page) -> None:
+    for _ in range(5):
+        page.mouse.click(30, 30)
+    for digit in PIN:
+        page.locator(".pin-key", has_text=digit).click()
+
+
+STATES: dict[str, Callable[[Page], object]] = {
+    "attract": lambda _: None,
+    "visit": lambda page: page.mouse.click(500, 300),
+    "warning": lambda page: (page.mouse.click(500, 300), page.clock.fast_forward(61_000)),
+    "service": lambda page: (page.mouse.click(500, 300), _serviced(page)),
+}
+"""What is done to see a kiosk in a state."""
+
+PIN = "1911"
+"""The demo's."""
+
+
+def kiosks(chromium: Browser, origin: str) -> Iterator[tuple[str, Image.Image]]:
+    """Each state of a kiosk, lying and upright, and its picture at half its size."""
+    for size, name in (((1920, 1080), ""), ((1080, 1920), "-upright")):
+        for state, act in STATES.items():
+            here = visitor(
+                chromium,
+                origin,
+                size=size,
+                reduced_motion="reduce",
+                color_scheme="light",
+                service_workers="allow",
+            )
+            here.page.clock.install()
+            here.page.goto(f"{origin}/kiosk.html")
+            here.wait("window.tourgen?.ready")
+            here.page.clock.resume()
+            here.page.wait_for_timeout(4000)  # for what is fine to come
+            act(here.page)
+            here.page.wait_for_timeout(2500)
+            yield f"{state}{name}", _shot(here.page).resize((size[0] // 2, size[1] // 2))
+            here.page.context.close()
+            if here.faults:
+                sys.exit("\n".join(here.faults))
 
 
 def _view(tour: dict[str, Any], room: dict[str, Any]) -> dict[str, Any]:

@@ -87,7 +87,7 @@ def test_hours_are_for_every_day_or_by_day(line: str, told: dict[str, str], tmp_
         ('controls = "lower"', "kiosk.controls: expected", ""),
         ('hours = "10-18"', 'kiosk.hours: expected hours such as "10:00-18:00"', ""),
         ('hours = { sat = "25:00-26:00" }', 'kiosk.hours: expected hours such as "10:00-18', ""),
-        ('hours = { sut = "10:00-18:00" }', "kiosk.hours: day `sut` does not exist", "`sat`"),
+        ('hours = { satt = "10:00-18:00" }', "kiosk.hours: day `satt` does not exist", "`sat`"),
         ("idle = 5", "kiosk.idle: ", "idle_s"),
     ],
 )

@@ -141,5 +141,6 @@ function memory(number: Intl.NumberFormat): string | null {
   const { memory: told } = performance as Performance & {
     readonly memory?: { readonly usedJSHeapSize: number };
   };
-  return told ? `${number.format(Math.round(told.usedJSHeapSize / MB))} MB` : null;
+  const bytes = told?.usedJSHeapSize ?? NaN;
+  return Number.isFinite(bytes) ? `${number.format(Math.round(bytes / MB))} MB` : null;
 }
