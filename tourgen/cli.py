@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _tell(StageError("disk: expected room, found none left", "free some, and build again"))
         return StageError.exit_code
     except KeyboardInterrupt:
-        print("stopped; the next build goes on from the last finished stage", file=sys.stderr)
+        print("stopped; the same line goes on from what is finished", file=sys.stderr)
         return 130
 
 
@@ -73,6 +73,7 @@ def _parser() -> argparse.ArgumentParser:
     plan = add("plan", _plan, "Say what a build would do, and why.", "DIR")
     build = add("build", _build, "Build the tour's website.", "DIR")
     serve = add("serve", _serve, "Serve a tour on this machine.", "DIR-or-SITE")
+    film = add("film", _film, "Make a video of the guided tour of a built tour.", "DIR-or-SITE")
     add("clean", _clean, "Drop the cache of a tour.", "DIR")
     doctor = add("doctor", _doctor, "Say what this machine lacks, and how to mend it.", "")
     build.add_argument(
@@ -94,6 +95,27 @@ def _parser() -> argparse.ArgumentParser:
         help="write where the time of what runs goes, a flame graph in HTML",
     )
     serve.add_argument("--port", type=_positive, default=8000, help="port (8000)")
+    film.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="FILE.mp4",
+        help="the film; FILE.webp, FILE.loop.mp4 and FILE.LANGUAGE.vtt are written beside it",
+    )
+    film.add_argument(
+        "--size",
+        default="1920x1080",
+        metavar="WIDTHxHEIGHT",
+        help="pixels (1920x1080); 3840x2160 for 4K",
+    )
+    film.add_argument("--fps", type=int, choices=(30, 60), default=30, help="frames a second (30)")
+    film.add_argument(
+        "--language", default="", metavar="TAG", help="of titles and captions (the tour's first)"
+    )
+    film.add_argument("--captions", action="store_true", help="write captions into the picture")
+    film.add_argument("--sound", action="store_true", help="add a sound track: sounds of notes")
+    film.add_argument("--part", metavar="FROM-TO", help="make these seconds alone, for a trial")
     for command in (check, plan, build, doctor):
         command.add_argument("--json", action="store_true", help="print JSON")
     return parser
@@ -210,15 +232,43 @@ def _built(asked: argparse.Namespace, out: str) -> Any:
 
 def _serve(asked: argparse.Namespace) -> int:
     from tourgen.serve import serve
+
+    serve(_site_of(asked.folder), "127.0.0.1", asked.port)
+    return 0
+
+
+def _site_of(folder: Path) -> Path:
+    """The site of a tour's folder, or the folder where it is one."""
     from tourgen.site import is_site
 
-    site = asked.folder if is_site(asked.folder) else asked.folder / OUTPUT
+    site = folder if is_site(folder) else folder / OUTPUT
     if not is_site(site):
         raise InputError(
-            f"`{asked.folder}`: expected a tour's site, found none",
-            f"build it first: tourgen build {asked.folder}",
+            f"`{folder}`: expected a tour's site, found none",
+            f"build it first: tourgen build {folder}",
         )
-    serve(site, "127.0.0.1", asked.port)
+    return site
+
+
+def _film(asked: argparse.Namespace) -> int:
+    from tourgen.film import make_film
+    from tourgen.film.progress import FrameBar
+    from tourgen.film.settings import FilmSettings, parse_part, parse_size
+
+    width, height = parse_size(asked.size)
+    settings = FilmSettings(
+        width=width,
+        height=height,
+        fps=asked.fps,
+        language=asked.language,
+        captions=asked.captions,
+        sound=asked.sound,
+        part=parse_part(asked.part) if asked.part else None,
+    )
+    with FrameBar() as bar:
+        written = make_film(_site_of(asked.folder), asked.output, settings, bar)
+    for path in written:
+        print(f"wrote {path}: {path.stat().st_size / 1e6:.1f} MB")
     return 0
 
 

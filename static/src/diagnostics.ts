@@ -43,9 +43,32 @@ export interface Diagnostics {
   teleport(position: Triple, lookAt: Triple): void;
 }
 
+/** What a film knows before its first picture; seconds count from its start. */
+export interface FilmPlan {
+  readonly seconds: number;
+  readonly language: string;
+  /** From here on nothing is written over the first room. */
+  readonly clear: number;
+  /** Number of each stop, from 0, and when the film stays there. */
+  readonly stays: readonly { readonly stop: number; readonly from: number; readonly to: number }[];
+  /** Captions by language. */
+  readonly cues: Readonly<
+    Record<string, readonly { readonly from: number; readonly to: number; readonly text: string }[]>
+  >;
+  /** Stops of a room with no way between them. */
+  readonly blocked: readonly { readonly from: number; readonly to: number; readonly room: string }[];
+}
+
+/** What `tourgen film` asks of the viewer, by `?film` in the address; see film/film.ts. */
+export interface FilmControls {
+  plan(): Promise<FilmPlan>;
+  /** Draws the picture of a second; resolves when it stands on the screen, whole. */
+  frame(second: number): Promise<void>;
+}
+
 declare global {
   interface Window {
-    tourgen?: Diagnostics;
+    tourgen?: Diagnostics | { readonly film: FilmControls };
   }
 }
 

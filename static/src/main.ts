@@ -23,9 +23,14 @@ async function main(): Promise<void> {
     showPlain(host, words.noTour, words.retry);
     return;
   }
+  const decoder = new URL(DRACO_FOLDER, import.meta.url);
+  if (new URLSearchParams(location.search).has("film")) {
+    const { Film } = await import("./film/film.ts");
+    new Film(host, site, decoder, tour);
+    return;
+  }
   keepIcon();
   await quiet(host);
-  const decoder = new URL(DRACO_FOLDER, import.meta.url);
   const asked = roomCalled(tour, host.dataset["room"] ?? null);
   const { Visit } = await import("./visit.ts");
   new Visit(host, site, decoder, tour, asked ?? startOf(tour)).start(asked === null);

@@ -7,7 +7,7 @@ import type { Frontend } from "./page/frontend.ts";
 import type { Action } from "./page/notice.ts";
 import type { Levels } from "./scene/levels.ts";
 import { Prefetch } from "./scene/prefetch.ts";
-import { RoomTiles } from "./scene/room-tiles.ts";
+import { CACHE_BYTES, CACHE_BYTES_PHONE, RoomTiles } from "./scene/room-tiles.ts";
 import type { Stage } from "./scene/stage.ts";
 import { startOf, type Room, type Tour, type View } from "./tour.ts";
 
@@ -113,7 +113,8 @@ export class Rooms {
   ): RoomTiles {
     const tileset = new URL(room.tileset, this.#site);
     const { camera } = this.#stage;
-    const options = { tileset, decoder: this.#decoder, camera, levels, phone: isTouch() };
+    const cacheBytes = isTouch() ? CACHE_BYTES_PHONE : CACHE_BYTES;
+    const options = { tileset, decoder: this.#decoder, camera, levels, cacheBytes };
     return new RoomTiles(options, events);
   }
 

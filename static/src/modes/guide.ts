@@ -3,10 +3,7 @@
 import { button, element, icon, ICONS } from "../dom.ts";
 import type { Stop } from "../tour.ts";
 import type { Words } from "../words.ts";
-
-/** Letters that are read in a second, and how long one stays at least and at most. */
-const LETTERS_S = 14;
-const STAY_S = [5, 30] as const;
+import { stayS } from "./stay.ts";
 
 export interface GuideHost {
   readonly stops: readonly Stop[];
@@ -121,9 +118,7 @@ export class Guide {
 
   get #stay(): number {
     const stop = this.#host.stops[this.#at];
-    if (!stop) return STAY_S[0];
-    const reading = this.#textOf(stop).length / LETTERS_S + 2;
-    return stop.seconds ?? Math.min(STAY_S[1], Math.max(STAY_S[0], reading));
+    return stop ? stayS(stop, this.#textOf(stop)) : 0;
   }
 
   #show(): void {

@@ -25,8 +25,8 @@ import { tinted } from "./tint.ts";
 /** Screen error in pixels above which a tile is replaced by its children. */
 const ERROR_TARGET_PX = 2;
 const MIB = 2 ** 20;
-const CACHE_BYTES = 256 * MIB;
-const CACHE_BYTES_PHONE = 128 * MIB;
+export const CACHE_BYTES = 256 * MIB;
+export const CACHE_BYTES_PHONE = 128 * MIB;
 const ANISOTROPY = 8;
 
 export interface RoomEvents {
@@ -47,7 +47,8 @@ export interface RoomTilesOptions {
   readonly decoder: LoadingManager;
   readonly camera: PerspectiveCamera;
   readonly levels: Levels;
-  readonly phone: boolean;
+  /** How many bytes of tiles are held, at most. */
+  readonly cacheBytes: number;
 }
 
 /** What every room's tiles are decoded with; made once. */
@@ -75,7 +76,7 @@ export class RoomTiles {
   #bytes = 0;
 
   constructor(
-    { tileset, decoder, camera, levels, phone }: RoomTilesOptions,
+    { tileset, decoder, camera, levels, cacheBytes }: RoomTilesOptions,
     events: RoomEvents,
   ) {
     this.#events = events;
@@ -84,7 +85,7 @@ export class RoomTiles {
     tiles.manager = decoder;
     tiles.errorTarget = levels === "view" ? ERROR_TARGET_PX : 0;
     tiles.maxDepth = 1;
-    tiles.lruCache.maxBytesSize = phone ? CACHE_BYTES_PHONE : CACHE_BYTES;
+    tiles.lruCache.maxBytesSize = cacheBytes;
     tiles.lruCache.minBytesSize = tiles.lruCache.maxBytesSize * 0.75;
     tiles.setCamera(camera);
     tiles.registerPlugin({ fetchData: (url: string, init: RequestInit) => this.#fetch(url, init) });
@@ -108,6 +109,11 @@ export class RoomTiles {
   get busy(): boolean {
     const { queued, downloading, parsing } = statsOf(this.#tiles);
     return this.#stale || !this.#rootShown || queued + downloading + parsing > 0;
+  }
+
+  /** Whether tiles did not come that are asked for again later. */
+  get lacks(): boolean {
+    return this.#failed.size > 0;
   }
 
   /** Tiles on screen. */

@@ -1,0 +1,147 @@
+"""Film: the guided path of a published tour as a video, drawn by its own viewer.
+
+One frame after the other, each drawn when all tiles are there that it shows, so that the film is
+the same on every machine, however slow. What is there stays there: a run that was killed goes on.
+"""
+
+from __future__ import annotations
+
+import errno
+import math
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+
+from tourgen import __version__
+from tourgen.errors import Faults, InputError
+from tourgen.film.camera import open_camera, require_camera
+from tourgen.film.companions import write_loop, write_poster
+from tourgen.film.ffmpeg import disk_full, require_ffmpeg
+from tourgen.film.progress import FrameBar
+from tourgen.film.segments import (
+    Segment,
+    digest_of,
+    encode_segment,
+    join_segments,
+    segments_of,
+    work_folder,
+)
+from tourgen.film.settings import FilmSettings
+from tourgen.film.soundtrack import mix_sounds, sounds_of
+from tourgen.film.stops import Json, blocked_faults, read_path
+from tourgen.film.subtitles import vtt_of
+
+SUFFIX = ".mp4"
+
+
+def make_film(site: Path, output: Path, settings: FilmSettings, bar: FrameBar) -> tuple[Path, ...]:
+    """Film a published tour.
+
+    Args:
+        site: The site's folder.
+        output: The film; poster, loop and captions are written beside it, by its name.
+        settings: What is asked for.
+        bar: Told of every frame.
+
+    Returns:
+        All that was written, the film first.
+
+    Raises:
+        MissingTool: A library is not installed.
+        InputError: The path cannot be filmed, Chromium or H.264 are not there, the disk is full.
+        StageError: Chromium, the viewer or ffmpeg failed.
+    """
+    _check_output(output)
+    tour = read_path(site, settings.language)
+    program = require_ffmpeg()
+    require_camera()
+    try:
+        folder = work_folder(output, digest_of(site, [__version__, asdict(settings)]))
+        plan, segments = _shoot(site, folder, program, settings, bar)
+        return _finish(site, folder, output, program, settings, tour, plan, segments)
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        raise disk_full(output.parent) from error
+
+
+def _check_output(output: Path) -> None:
+    if output.suffix != SUFFIX:
+        raise InputError(f"-o: expected a file named *{SUFFIX}, found `{output}`")
+    if not output.parent.is_dir():
+        raise InputError(f"-o: expected the folder `{output.parent}`, found none", "make it first")
+    if output.is_dir():
+        raise InputError(f"-o: expected a file, found the folder `{output}`")
+
+
+def _shoot(
+    site: Path, folder: Path, program: str, settings: FilmSettings, bar: FrameBar
+) -> tuple[Json, tuple[Segment, ...]]:
+    """Draw and encode what is not there yet."""
+    with open_camera(site, settings) as camera:
+        plan = camera.plan
+        blocked = blocked_faults(plan["blocked"])
+        if blocked:
+            raise Faults(tuple(blocked))
+        first, last = _frames(plan, settings)
+        segments = segments_of(first, last, settings.fps)
+        lacking = [each for each in segments if not (folder / each.name).is_file()]
+        bar.resume(last - first - sum(each.last - each.first for each in lacking), last - first)
+
+        def picture(frame: int) -> bytes:
+            taken = camera.picture(frame / settings.fps)
+            bar.advance()
+            return taken
+
+        for segment in lacking:
+            encode_segment(program, folder, segment, settings.fps, picture)
+            bar.segment()
+    return plan, segments
+
+
+def _frames(plan: Json, settings: FilmSettings) -> tuple[int, int]:
+    """Number of the first frame, and of the one after the last."""
+    count = math.ceil(plan["seconds"] * settings.fps)
+    if settings.part is None:
+        return 0, count
+    first, last = (round(second * settings.fps) for second in settings.part)
+    if first >= min(last, count):
+        raise InputError(
+            f"--part: expected frames within the film's {plan['seconds']:.0f} s, found none"
+        )
+    return first, min(last, count)
+
+
+def _finish(
+    site: Path,
+    folder: Path,
+    output: Path,
+    program: str,
+    settings: FilmSettings,
+    tour: Json,
+    plan: Json,
+    segments: tuple[Segment, ...],
+) -> tuple[Path, ...]:
+    """Join the segments, write what goes with the film, and move all into its place."""
+    start_s, end_s = segments[0].first / settings.fps, segments[-1].last / settings.fps
+    sound = folder / "sound.m4a" if settings.sound else None
+    if sound:
+        mix_sounds(program, site, sounds_of(tour, plan["stays"]), (start_s, end_s), sound)
+    names = {"film": f"film{SUFFIX}", "poster": "film.webp", "loop": f"film.loop{SUFFIX}"}
+    join_segments(program, folder, segments, sound, names["film"])
+    clear_s = plan["clear"] if start_s <= plan["clear"] < end_s else (start_s + end_s) / 2
+    write_poster(program, folder, names["film"], clear_s - start_s, names["poster"])
+    write_loop(program, folder, names["film"], clear_s - start_s, end_s - start_s, names["loop"])
+    for language, cues in plan["cues"].items():
+        names[language] = f"film.{language}.vtt"
+        text = vtt_of(cues, start_s, end_s)
+        (folder / names[language]).write_text(text, encoding="utf-8")
+    return _published(folder, output, list(names.values()))
+
+
+def _published(folder: Path, output: Path, names: list[str]) -> tuple[Path, ...]:
+    targets = tuple(output.with_name(output.stem + name.removeprefix("film")) for name in names)
+    for name, target in zip(names, targets, strict=True):
+        (folder / name).replace(target)
+    shutil.rmtree(folder, ignore_errors=True)
+    return targets
