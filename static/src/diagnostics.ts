@@ -51,6 +51,8 @@ export interface FilmPlan {
   readonly clear: number;
   /** Number of each stop, from 0, and when the film stays there. */
   readonly stays: readonly { readonly stop: number; readonly from: number; readonly to: number }[];
+  /** When another room takes the place of one. */
+  readonly cuts: readonly number[];
   /** Captions by language. */
   readonly cues: Readonly<
     Record<string, readonly { readonly from: number; readonly to: number; readonly text: string }[]>

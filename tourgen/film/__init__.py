@@ -60,18 +60,26 @@ def make_film(site: Path, output: Path, settings: FilmSettings, bar: FrameBar) -
         plan, segments = _shoot(site, folder, program, settings, bar)
         return _finish(site, folder, output, program, settings, tour, plan, segments)
     except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
-            raise
-        raise disk_full(output.parent) from error
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise disk_full(output.parent) from error
+        if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+            raise InputError(
+                f"`{error.filename}`: expected to be allowed to write it, found: {error.strerror}",
+                "choose another folder with -o",
+            ) from error
+        raise
 
 
 def _check_output(output: Path) -> None:
     if output.suffix != SUFFIX:
-        raise InputError(f"-o: expected a file named *{SUFFIX}, found `{output}`")
+        raise InputError(
+            f"-o: expected a file named *{SUFFIX}, found `{output}`",
+            f"-o {output.with_suffix(SUFFIX)}",
+        )
     if not output.parent.is_dir():
         raise InputError(f"-o: expected the folder `{output.parent}`, found none", "make it first")
     if output.is_dir():
-        raise InputError(f"-o: expected a file, found the folder `{output}`")
+        raise InputError(f"-o: expected a file, found the folder `{output}`", "name another")
 
 
 def _shoot(

@@ -34,6 +34,7 @@ FLAGS: Final = (
     "--disable-sync",
 )
 
+_SHOWN: Final = "window.tourgen ? ('film' in window.tourgen ? 'film' : 'visit') : ''"
 _OPENS_S: Final = 60.0
 _LOOKS_EVERY_S: Final = 0.02
 
@@ -86,13 +87,13 @@ def require_camera() -> Path:
 
 
 @contextmanager
-def open_camera(site: Path, settings: FilmSettings, background: str = "") -> Iterator[Camera]:
+def open_camera(site: Path, settings: FilmSettings, **wishes: str) -> Iterator[Camera]:
     """Serve a site, and show its film in a page of the size asked for.
 
     Args:
         site: The site's folder.
         settings: What is asked for.
-        background: Colour of the void, six hexadecimal digits; "" for the viewer's own.
+        wishes: What else the viewer is asked for in the address, see diagnostics.ts.
 
     Raises:
         MissingTool: The library that drives Chromium is not installed.
@@ -102,7 +103,7 @@ def open_camera(site: Path, settings: FilmSettings, background: str = "") -> Ite
     program = require_camera()
     from playwright.sync_api import sync_playwright
 
-    asked = {"film": "", "lang": settings.language, "background": background}
+    asked = {"film": "", "lang": settings.language, **wishes}
     if settings.captions:
         asked["captions"] = ""
     with open_server(site, port=0) as server, sync_playwright() as playwright:
@@ -131,9 +132,9 @@ def _flags() -> list[str]:
 def _aimed(page: Page, address: str) -> Camera:
     page.goto(address)
     end = time.monotonic() + _OPENS_S
-    while not page.evaluate("Boolean(window.tourgen?.film)"):
-        # The published headers forbid playwright's own wait, which evaluates strings.
-        if page.evaluate("Boolean(window.tourgen)"):
+    # The published headers forbid playwright's own wait, which evaluates strings.
+    while (shown := page.evaluate(_SHOWN)) != "film":
+        if shown == "visit":
             raise InputError(
                 "film: expected a site whose viewer can film, found an older one",
                 "build it again with this tourgen",

@@ -39,7 +39,8 @@ class FrameBar:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._display.stop()
+        if self._console.is_terminal:
+            self._display.stop()
 
     def resume(self, done: int, total: int) -> None:
         """Say how much there is to do, and how much was done by an earlier run."""

@@ -73,6 +73,7 @@ export class Film {
       language: this.#language,
       clear: timeline.clearS,
       stays: timeline.stays,
+      cuts: timeline.cuts,
       cues: Object.fromEntries(
         this.#tour.languages.map((tag) => [tag, this.#cuesIn(tag, timeline)]),
       ),

@@ -42,9 +42,10 @@ export interface Moment extends Over {
 export class Timeline {
   readonly seconds: number;
   readonly stays: readonly Staying[];
+  /** When another room takes the place of one. */
+  readonly cuts: readonly number[];
   readonly #starts: readonly number[];
   readonly #shots: readonly Shot[];
-  readonly #cuts: readonly number[];
   readonly #lastS: number;
 
   /**
@@ -63,7 +64,7 @@ export class Timeline {
     });
     this.#shots = shots;
     this.#starts = starts;
-    this.#cuts = cuts;
+    this.cuts = cuts;
     this.#lastS = at;
     this.seconds = at + FALL_S + creditsS;
     this.stays = shots.flatMap(({ stop, seconds }, i) => {
@@ -86,7 +87,7 @@ export class Timeline {
     return {
       room: shot.room,
       pose: shot.pose(seconds),
-      dark: Math.max(this.#ends(t), ...this.#cuts.map((cut) => dip(t - cut))),
+      dark: Math.max(this.#ends(t), ...this.cuts.map((cut) => dip(t - cut))),
       title: window(t, 0.3, TITLE_GONE_S),
       name: Math.max(...this.#namesFrom().map((from) => window(t, from, from + NAME_S))),
       credits: window(t, this.#lastS + FALL_S, this.seconds - 0.3),
@@ -94,7 +95,7 @@ export class Timeline {
   }
 
   #namesFrom(): readonly number[] {
-    return [TITLE_S + LIFT_S, ...this.#cuts.map((cut) => cut + DIP_S / 2)].map(
+    return [TITLE_S + LIFT_S, ...this.cuts.map((cut) => cut + DIP_S / 2)].map(
       (seen) => seen + NAME_AFTER_S,
     );
   }
