@@ -9,8 +9,9 @@ from __future__ import annotations
 import errno
 import math
 import shutil
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Final
 
 from tourgen import __version__
 from tourgen.errors import Faults, InputError
@@ -31,7 +32,11 @@ from tourgen.film.soundtrack import mix_sounds, sounds_of
 from tourgen.film.stops import Json, blocked_faults, read_path
 from tourgen.film.subtitles import vtt_of
 
-SUFFIX = ".mp4"
+SUFFIX: Final = ".mp4"
+
+_FILM: Final = "film.mp4"
+_POSTER: Final = "film.webp"
+_LOOP: Final = "film.loop.mp4"
 
 
 def make_film(site: Path, output: Path, settings: FilmSettings, bar: FrameBar) -> tuple[Path, ...]:
@@ -57,8 +62,9 @@ def make_film(site: Path, output: Path, settings: FilmSettings, bar: FrameBar) -
     require_camera()
     try:
         folder = work_folder(output, digest_of(site, [__version__, asdict(settings)]))
-        plan, segments = _shoot(site, folder, program, settings, bar)
-        return _finish(site, folder, output, program, settings, tour, plan, segments)
+        work = _Work(site, folder, program, settings)
+        plan, segments = _shoot(work, bar)
+        return _published(folder, output, _finish(work, tour, plan, segments))
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             raise disk_full(output.parent) from error
@@ -68,6 +74,23 @@ def make_film(site: Path, output: Path, settings: FilmSettings, bar: FrameBar) -
                 "choose another folder with -o",
             ) from error
         raise
+
+
+@dataclass(frozen=True, slots=True)
+class _Work:
+    """What every step of a film needs.
+
+    Attributes:
+        site: The site's folder.
+        folder: Where everything waits until all is there.
+        program: ffmpeg.
+        settings: What is asked for.
+    """
+
+    site: Path
+    folder: Path
+    program: str
+    settings: FilmSettings
 
 
 def _check_output(output: Path) -> None:
@@ -82,27 +105,26 @@ def _check_output(output: Path) -> None:
         raise InputError(f"-o: expected a file, found the folder `{output}`", "name another")
 
 
-def _shoot(
-    site: Path, folder: Path, program: str, settings: FilmSettings, bar: FrameBar
-) -> tuple[Json, tuple[Segment, ...]]:
+def _shoot(work: _Work, bar: FrameBar) -> tuple[Json, tuple[Segment, ...]]:
     """Draw and encode what is not there yet."""
-    with open_camera(site, settings) as camera:
+    fps = work.settings.fps
+    with open_camera(work.site, work.settings) as camera:
         plan = camera.plan
         blocked = blocked_faults(plan["blocked"])
         if blocked:
             raise Faults(tuple(blocked))
-        first, last = _frames(plan, settings)
-        segments = segments_of(first, last, settings.fps)
-        lacking = [each for each in segments if not (folder / each.name).is_file()]
+        first, last = _frames(plan, work.settings)
+        segments = segments_of(first, last, fps)
+        lacking = [each for each in segments if not (work.folder / each.name).is_file()]
         bar.resume(last - first - sum(each.last - each.first for each in lacking), last - first)
 
         def picture(frame: int) -> bytes:
-            taken = camera.picture(frame / settings.fps)
+            taken = camera.picture(frame / fps)
             bar.advance()
             return taken
 
         for segment in lacking:
-            encode_segment(program, folder, segment, settings.fps, picture)
+            encode_segment(work.program, work.folder, segment, fps, picture)
             bar.segment()
     return plan, segments
 
@@ -120,34 +142,25 @@ def _frames(plan: Json, settings: FilmSettings) -> tuple[int, int]:
     return first, min(last, count)
 
 
-def _finish(
-    site: Path,
-    folder: Path,
-    output: Path,
-    program: str,
-    settings: FilmSettings,
-    tour: Json,
-    plan: Json,
-    segments: tuple[Segment, ...],
-) -> tuple[Path, ...]:
-    """Join the segments, write what goes with the film, and move all into its place."""
-    start_s, end_s = segments[0].first / settings.fps, segments[-1].last / settings.fps
-    sound = folder / "sound.m4a" if settings.sound else None
+def _finish(work: _Work, tour: Json, plan: Json, segments: tuple[Segment, ...]) -> list[str]:
+    """Join the segments and write what goes with the film; the names of all, the film's first."""
+    program, folder, fps = work.program, work.folder, work.settings.fps
+    start_s, end_s = segments[0].first / fps, segments[-1].last / fps
+    sound = folder / "sound.m4a" if work.settings.sound else None
     if sound:
-        mix_sounds(program, site, sounds_of(tour, plan["stays"]), (start_s, end_s), sound)
-    names = {"film": f"film{SUFFIX}", "poster": "film.webp", "loop": f"film.loop{SUFFIX}"}
-    join_segments(program, folder, segments, sound, names["film"])
+        mix_sounds(program, work.site, sounds_of(tour, plan["stays"]), (start_s, end_s), sound)
+    join_segments(program, folder, segments, sound, _FILM)
     clear_s = plan["clear"] if start_s <= plan["clear"] < end_s else (start_s + end_s) / 2
-    write_poster(program, folder, names["film"], clear_s - start_s, names["poster"])
-    write_loop(program, folder, names["film"], clear_s - start_s, end_s - start_s, names["loop"])
-    for language, cues in plan["cues"].items():
-        names[language] = f"film.{language}.vtt"
-        text = vtt_of(cues, start_s, end_s)
-        (folder / names[language]).write_text(text, encoding="utf-8")
-    return _published(folder, output, list(names.values()))
+    write_poster(program, folder, _FILM, clear_s - start_s, _POSTER)
+    write_loop(program, folder, _FILM, clear_s - start_s, end_s - start_s, _LOOP)
+    captions = {f"film.{language}.vtt": cues for language, cues in plan["cues"].items()}
+    for name, cues in captions.items():
+        (folder / name).write_text(vtt_of(cues, start_s, end_s), encoding="utf-8")
+    return [_FILM, _POSTER, _LOOP, *captions]
 
 
 def _published(folder: Path, output: Path, names: list[str]) -> tuple[Path, ...]:
+    """Move all into its place, and drop the folder where it waited."""
     targets = tuple(output.with_name(output.stem + name.removeprefix("film")) for name in names)
     for name, target in zip(names, targets, strict=True):
         (folder / name).replace(target)

@@ -8,9 +8,6 @@ from typing import Final
 
 from tourgen.errors import InputError
 
-RATES: Final = (30, 60)
-"""Frames a second."""
-
 _LEAST: Final = (320, 180)
 _MOST: Final = (7680, 4320)
 

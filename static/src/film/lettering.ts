@@ -31,7 +31,7 @@ export class Lettering {
       { class: "film-credits" },
       element("h2", {}, title),
       prose(textIn(tour.credits, language)),
-      ...(license ? [element("p", { class: "small" }, `${words.license}: ${license}`)] : []),
+      ...(license ? [element("p", { class: "small" }, license)] : []),
       element("p", { class: "small" }, words.madeWith),
     );
     this.element = element(
