@@ -100,7 +100,7 @@ def test_three_seconds_through_a_door(site: Path, cut_s: float, tmp_path: Path) 
     assert beside == {f"{name}.{kind}" for name in ("film", "again") for kind in made}
 
     said = told(film)
-    assert re.search(r"Video: h264 \(High\) \(avc1.*yuv420p\(tv, bt709", said), said
+    assert re.search(r"Video: h264 \(High\) \(avc1.*yuv420p\(tv, bt709, ", said), said
     assert re.search(r"480x270.* 30 fps", said), said
     assert "Audio: aac" in said
     assert "Audio" not in told(film.with_suffix(".loop.mp4"))

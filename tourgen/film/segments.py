@@ -20,10 +20,10 @@ _THREADS: Final = 4
 _STATE: Final = "film.json"
 
 _COLOUR: Final = (
-    *("-vf", "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"),
-    *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"),
-    *("-color_range", "tv"),
+    "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,"
+    "setparams=range=tv:color_primaries=bt709:color_trc=bt709:colorspace=bt709"
 )
+"""From the screen's colours to those that players expect of a film of this size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ def encode_segment(
     aside = folder / f"{segment.name}.new"
     arguments = [
         *("-f", "image2pipe", "-c:v", "png", "-framerate", str(fps), "-i", "pipe:0"),
-        *_COLOUR,
+        *("-vf", _COLOUR),
         *("-c:v", H264, "-preset", "medium", "-crf", str(_CRF), "-threads", str(_THREADS)),
         *("-g", str(SEGMENT_S * fps), "-keyint_min", str(SEGMENT_S * fps), "-sc_threshold", "0"),
         *BITEXACT,
