@@ -64,8 +64,11 @@ export interface FilmPlan {
 /** What `tourgen film` asks of the viewer, by `?film` in the address; see film/film.ts. */
 export interface FilmControls {
   plan(): Promise<FilmPlan>;
-  /** Draws the picture of a second; resolves when it stands on the screen, whole. */
-  frame(second: number): Promise<void>;
+  /**
+   * Draws the picture of a second, whole, over all of the window but its two last lines: when they
+   * have the colour that is returned (0xRRGGBB), it stands on the screen.
+   */
+  frame(second: number): Promise<number>;
 }
 
 declare global {

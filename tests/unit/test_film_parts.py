@@ -9,19 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from imageio_ffmpeg import get_ffmpeg_exe
+from PIL import Image
 
 from tourgen.errors import InputError, StageError
 from tourgen.film.ffmpeg import require_ffmpeg
 from tourgen.film.segments import Segment, digest_of, encode_segment, segments_of, work_folder
-from tourgen.film.settings import parse_part, parse_size
+from tourgen.film.settings import FilmSettings, parse_part, parse_size
 from tourgen.film.soundtrack import Played, mix_sounds, sounds_of
 from tourgen.film.subtitles import vtt_of
 
 RATE = 48_000
-PNG = bytes.fromhex(
-    "89504e470d0a1a0a0000000d4948445200000002000000020802000000fdd49a73"
-    "0000001049444154789c6370683800440c100a00280e0601433a63da0000000049454e44ae426082"
-)
 
 
 @pytest.mark.parametrize(
@@ -149,8 +146,12 @@ def test_an_ffmpeg_without_h264_is_told(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_a_disk_that_fills_is_told(tmp_path: Path) -> None:
     segment = Segment(0, 2)
+
+    def grey(_: int) -> Image.Image:
+        return Image.new("RGB", (2, 2), "grey")
+
     (tmp_path / f"{segment.name}.new").symlink_to("/dev/full")
     with pytest.raises(InputError, match="expected room for the film, found none left") as fault:
-        encode_segment(require_ffmpeg(), tmp_path, segment, 30, lambda _: PNG)
+        encode_segment(require_ffmpeg(), tmp_path, segment, FilmSettings(2, 2), grey)
     assert "goes on where it stopped" in fault.value.hint
     assert not (tmp_path / segment.name).exists()

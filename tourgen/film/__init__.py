@@ -13,6 +13,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
+from PIL import Image
+
 from tourgen import __version__
 from tourgen.errors import Faults, InputError
 from tourgen.film.camera import open_camera, require_camera
@@ -118,13 +120,13 @@ def _shoot(work: _Work, bar: FrameBar) -> tuple[Json, tuple[Segment, ...]]:
         lacking = [each for each in segments if not (work.folder / each.name).is_file()]
         bar.resume(last - first - sum(each.last - each.first for each in lacking), last - first)
 
-        def picture(frame: int) -> bytes:
+        def picture(frame: int) -> Image.Image:
             taken = camera.picture(frame / fps)
             bar.advance()
             return taken
 
         for segment in lacking:
-            encode_segment(work.program, work.folder, segment, fps, picture)
+            encode_segment(work.program, work.folder, segment, work.settings, picture)
             bar.segment()
     return plan, segments
 

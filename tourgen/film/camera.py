@@ -9,10 +9,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
+from io import BytesIO
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
+
+from PIL import Image
 
 from tourgen.doctor import browser
 from tourgen.errors import InputError, MissingTool, StageError
@@ -35,6 +38,10 @@ FLAGS: Final = (
 )
 
 _SHOWN: Final = "window.tourgen ? ('film' in window.tourgen ? 'film' : 'visit') : ''"
+MARK_LINES: Final = 2
+"""Lines of the page below the picture that tell which one it is."""
+
+_TRIES: Final = 100
 _OPENS_S: Final = 60.0
 _LOOKS_EVERY_S: Final = 0.02
 
@@ -51,19 +58,31 @@ class Camera:
     _page: Page
     _protocol: CDPSession
 
-    def picture(self, second: float) -> bytes:
-        """A PNG of one second of the film.
+    def picture(self, second: float) -> Image.Image:
+        """The picture of one second of the film, RGB.
 
         Raises:
             StageError: The viewer could not draw it whole.
         """
         with _told():
-            self._page.evaluate("second => window.tourgen.film.frame(second)", second)
-            # Playwright's own screenshots pack pictures three times as long.
-            taken = self._protocol.send(
-                "Page.captureScreenshot", {"format": "png", "optimizeForSpeed": True}
-            )
-        return base64.b64decode(taken["data"])
+            mark = self._page.evaluate("second => window.tourgen.film.frame(second)", second)
+            for _ in range(_TRIES):
+                taken = self._taken()
+                width, height = taken.size
+                if taken.getpixel((width // 2, height - 1)) == _colour(mark):
+                    return taken.crop((0, 0, width, height - MARK_LINES))
+        raise StageError(f"film: expected the picture of {second:.2f} s, found the one before")
+
+    def _taken(self) -> Image.Image:
+        """What stands on the screen: on a busy machine it may yet be the picture before."""
+        # Playwright's own screenshots pack pictures three times as long.
+        asked = {"format": "png", "optimizeForSpeed": True}
+        taken = self._protocol.send("Page.captureScreenshot", asked)
+        return Image.open(BytesIO(base64.b64decode(taken["data"]))).convert("RGB")
+
+
+def _colour(mark: int) -> tuple[int, int, int]:
+    return mark >> 16, mark >> 8 & 255, mark & 255
 
 
 def require_camera() -> Path:
@@ -112,7 +131,7 @@ def open_camera(site: Path, settings: FilmSettings, **wishes: str) -> Iterator[C
             with _told():
                 chromium = playwright.chromium.launch(executable_path=program, args=_flags())
                 page = chromium.new_page(
-                    viewport={"width": settings.width, "height": settings.height},
+                    viewport={"width": settings.width, "height": settings.height + MARK_LINES},
                     device_scale_factor=1,
                     color_scheme="dark",
                     locale="en",

@@ -10,7 +10,10 @@ from hashlib import file_digest, sha256
 from pathlib import Path
 from typing import Any, Final
 
+from PIL import Image
+
 from tourgen.film.ffmpeg import BITEXACT, H264, fed, run
+from tourgen.film.settings import FilmSettings
 
 SEGMENT_S: Final = 2
 _CRF: Final = 18
@@ -73,7 +76,11 @@ def work_folder(output: Path, digest: str) -> Path:
 
 
 def encode_segment(
-    program: str, folder: Path, segment: Segment, fps: int, picture: Callable[[int], bytes]
+    program: str,
+    folder: Path,
+    segment: Segment,
+    settings: FilmSettings,
+    picture: Callable[[int], Image.Image],
 ) -> None:
     """Write one segment, aside first.
 
@@ -81,25 +88,27 @@ def encode_segment(
         program: ffmpeg.
         folder: Where the segments are.
         segment: Which one.
-        fps: Frames a second.
-        picture: The PNG of a frame, by its number.
+        settings: Size and frames a second.
+        picture: A frame, RGB, by its number.
 
     Raises:
         InputError: The disk is full.
         StageError: ffmpeg or what draws failed.
     """
     aside = folder / f"{segment.name}.new"
+    group = SEGMENT_S * settings.fps
     arguments = [
-        *("-f", "image2pipe", "-c:v", "png", "-framerate", str(fps), "-i", "pipe:0"),
+        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{settings.width}x{settings.height}"),
+        *("-framerate", str(settings.fps), "-i", "pipe:0"),
         *("-vf", _COLOUR),
         *("-c:v", H264, "-preset", "medium", "-crf", str(_CRF), "-threads", str(_THREADS)),
-        *("-g", str(SEGMENT_S * fps), "-keyint_min", str(SEGMENT_S * fps), "-sc_threshold", "0"),
+        *("-g", str(group), "-keyint_min", str(group), "-sc_threshold", "0"),
         *BITEXACT,
         *("-f", "mp4", aside.name),
     ]
     with fed(program, arguments, folder, f"film: frames {segment.first} to {segment.last}") as sink:
         for frame in range(segment.first, segment.last):
-            sink.write(picture(frame))
+            sink.write(picture(frame).tobytes())
     aside.replace(folder / segment.name)
 
 

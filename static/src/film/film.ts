@@ -6,6 +6,7 @@
  */
 
 import { readQuery, type FilmPlan } from "../diagnostics.ts";
+import { element } from "../dom.ts";
 import { readingS } from "../modes/stay.ts";
 import { tileDecoder } from "../scene/room-tiles.ts";
 import { Stage } from "../scene/stage.ts";
@@ -16,6 +17,10 @@ import { Lettering } from "./lettering.ts";
 import { Scenery } from "./scenery.ts";
 import { shotsOf, type Blocked, type Ground } from "./script.ts";
 import { Timeline } from "./timeline.ts";
+
+/** Colours of the mark, far apart from one picture to the next. */
+const MARKS = 2 ** 24;
+const MARK_STEP = 9_973_333;
 
 interface Reel {
   readonly timeline: Timeline;
@@ -32,6 +37,9 @@ export class Film {
   readonly #lettering: Lettering;
   readonly #reel: Promise<Reel>;
   readonly #captions: boolean;
+  /** Below the picture: tells by its colour which one stands on the screen. */
+  readonly #mark = element("div", { class: "film-mark" });
+  #drawn = 0;
 
   constructor(host: HTMLElement, site: URL, decoder: URL, tour: Tour) {
     const asked = new URLSearchParams(location.search);
@@ -45,6 +53,7 @@ export class Film {
     const canvas = document.createElement("canvas");
     host.classList.add("film");
     host.replaceChildren(canvas, this.#lettering.element);
+    document.body.append(this.#mark);
     this.#stage = new Stage(canvas, background, () => "still");
     this.#stage.hold();
     this.#scenery = new Scenery(site, this.#stage, tileDecoder(decoder), levels);
@@ -81,8 +90,8 @@ export class Film {
     };
   }
 
-  /** Draws the picture of a second, whole. */
-  async #frame(t: number): Promise<void> {
+  /** Draws the picture of a second, whole. Returns its mark. */
+  async #frame(t: number): Promise<number> {
     const { timeline, cues } = await this.#reel;
     const { room, pose, ...over } = timeline.at(t);
     await this.#scenery.enter(room);
@@ -91,7 +100,10 @@ export class Film {
     await nextPicture();
     this.#lettering.show(room, over, cue?.text ?? "");
     this.#stage.render();
-    await nextPicture(); // or the browser may hand out the one before
+    const mark = (++this.#drawn * MARK_STEP) % MARKS;
+    this.#mark.style.backgroundColor = `#${mark.toString(16).padStart(6, "0")}`;
+    await nextPicture();
+    return mark;
   }
 
   #cuesIn(language: string, { stays }: Timeline): Cue[] {

@@ -1,7 +1,8 @@
 /** How the film's texts look: in parts of the picture's height, so that every size shows the same. */
 
 export const LOOK = `
-#tour.film { cursor: none; }
+#tour.film { bottom: 2px; cursor: none; }
+.film-mark { position: fixed; inset: auto 0 0; height: 2px; }
 #tour.film canvas { outline: none; cursor: none; }
 .film-over { position: absolute; inset: 0; font-family: var(--sans); font-size: 2.6vh; line-height: 1.4; }
 .film-over > * { position: absolute; }
