@@ -56,6 +56,8 @@ export class Film {
     document.body.append(this.#mark);
     this.#stage = new Stage(canvas, background, () => "still");
     this.#stage.hold();
+    // Where two tiles meet the first one drawn wins: not the first one that came, as else.
+    this.#stage.renderer.setOpaqueSort((a, b) => a.object.name.localeCompare(b.object.name, "en"));
     this.#scenery = new Scenery(site, this.#stage, tileDecoder(decoder), levels);
     this.#reel = this.#cut();
     window.tourgen = { film: { plan: () => this.#plan(), frame: (t) => this.#frame(t) } };

@@ -181,6 +181,9 @@ export class RoomTiles {
   }
 
   #loaded(scene: Object3D, tile: Tile): void {
+    scene.traverse((object) => {
+      object.name = tile.content?.uri ?? "";
+    });
     for (const material of materialsOf(scene)) {
       if (material.map) material.map.anisotropy = ANISOTROPY;
       tinted(material);
