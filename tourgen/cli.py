@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _tell(StageError("disk: expected room, found none left", "free some, and build again"))
         return StageError.exit_code
     except KeyboardInterrupt:
-        print("stopped; the next build goes on from the last finished stage", file=sys.stderr)
+        print("stopped; the same line goes on from what is finished", file=sys.stderr)
         return 130
 
 
@@ -74,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     build = add("build", _build, "Build the tour's website.", "DIR")
     serve = add("serve", _serve, "Serve a tour on this machine.", "DIR-or-SITE")
     kiosk = add("kiosk", _kiosk, "Show a tour on a screen that nobody attends.", "DIR-or-SITE")
+    film = add("film", _film, "Make a video of the guided tour of a built tour.", "DIR-or-SITE")
     add("clean", _clean, "Drop the cache of a tour.", "DIR")
     doctor = add("doctor", _doctor, "Say what this machine lacks, and how to mend it.", "")
     build.add_argument(
@@ -102,6 +103,27 @@ def _parser() -> argparse.ArgumentParser:
     )
     serve.add_argument("--port", type=_positive, default=8000, help="port (8000)")
     kiosk.add_argument("--port", type=_positive, default=8710, help="port (8710)")
+    film.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="FILE.mp4",
+        help="the film; FILE.webp, FILE.loop.mp4 and FILE.LANGUAGE.vtt are written beside it",
+    )
+    film.add_argument(
+        "--size",
+        default="1920x1080",
+        metavar="WIDTHxHEIGHT",
+        help="pixels (1920x1080); 3840x2160 for 4K",
+    )
+    film.add_argument("--fps", type=int, choices=(30, 60), default=30, help="frames a second (30)")
+    film.add_argument(
+        "--language", default="", metavar="TAG", help="of titles and captions (the tour's first)"
+    )
+    film.add_argument("--captions", action="store_true", help="write captions into the picture")
+    film.add_argument("--sound", action="store_true", help="add a sound track: sounds of notes")
+    film.add_argument("--part", metavar="FROM-TO", help="make these seconds alone, for a trial")
     for command in (check, plan, build, doctor):
         command.add_argument("--json", action="store_true", help="print JSON")
     return parser
@@ -249,6 +271,28 @@ def _site(folder: Path) -> Path:
             f"build it first: tourgen build {folder}",
         )
     return site
+
+
+def _film(asked: argparse.Namespace) -> int:
+    from tourgen.film import make_film
+    from tourgen.film.progress import FrameBar
+    from tourgen.film.settings import FilmSettings, parse_part, parse_size
+
+    width, height = parse_size(asked.size)
+    settings = FilmSettings(
+        width=width,
+        height=height,
+        fps=asked.fps,
+        language=asked.language,
+        captions=asked.captions,
+        sound=asked.sound,
+        part=parse_part(asked.part) if asked.part else None,
+    )
+    with FrameBar() as bar:
+        written = make_film(_site(asked.folder), asked.output, settings, bar)
+    for path in written:
+        print(f"wrote {path}: {path.stat().st_size / 1e6:.1f} MB")
+    return 0
 
 
 def _clean(asked: argparse.Namespace) -> int:

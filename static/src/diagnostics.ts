@@ -43,9 +43,37 @@ export interface Diagnostics {
   teleport(position: Triple, lookAt: Triple): void;
 }
 
+/** What a film knows before its first picture; seconds count from its start. */
+export interface FilmPlan {
+  readonly seconds: number;
+  readonly language: string;
+  /** From here on nothing is written over the first room. */
+  readonly clear: number;
+  /** Number of each stop, from 0, and when the film stays there. */
+  readonly stays: readonly { readonly stop: number; readonly from: number; readonly to: number }[];
+  /** When another room takes the place of one. */
+  readonly cuts: readonly number[];
+  /** Captions by language. */
+  readonly cues: Readonly<
+    Record<string, readonly { readonly from: number; readonly to: number; readonly text: string }[]>
+  >;
+  /** Stops of a room with no way between them. */
+  readonly blocked: readonly { readonly from: number; readonly to: number; readonly room: string }[];
+}
+
+/** What `tourgen film` asks of the viewer, by `?film` in the address; see film/film.ts. */
+export interface FilmControls {
+  plan(): Promise<FilmPlan>;
+  /**
+   * Draws the picture of a second, whole, over all of the window but its two last lines: when they
+   * have the colour that is returned (0xRRGGBB), it stands on the screen.
+   */
+  frame(second: number): Promise<number>;
+}
+
 declare global {
   interface Window {
-    tourgen?: Diagnostics;
+    tourgen?: Diagnostics | { readonly film: FilmControls };
   }
 }
 

@@ -41,6 +41,11 @@ export async function open(
     console.warn(error);
     return give(words.noTour, words.retry);
   }
+  if (new URLSearchParams(location.search).has("film")) {
+    const { Film } = await import("./film/film.ts");
+    new Film(host, files, tour);
+    return;
+  }
   keepIcon();
   await quiet(host);
   const named = addresses.roomAt(new URL(location.href)) ?? host.dataset["room"] ?? null;

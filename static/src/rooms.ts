@@ -8,7 +8,7 @@ import type { Frontend } from "./page/frontend.ts";
 import type { Action } from "./page/notice.ts";
 import type { Levels } from "./scene/levels.ts";
 import { Prefetch } from "./scene/prefetch.ts";
-import { RoomTiles } from "./scene/room-tiles.ts";
+import { CACHE_BYTES, CACHE_BYTES_PHONE, RoomTiles } from "./scene/room-tiles.ts";
 import type { Stage } from "./scene/stage.ts";
 import { startOf, type Room, type Tour, type View } from "./tour.ts";
 
@@ -118,7 +118,7 @@ export class Rooms {
       decoder: this.#decoder,
       camera: this.#stage.camera,
       levels,
-      phone: isTouch(),
+      cacheBytes: isTouch() ? CACHE_BYTES_PHONE : CACHE_BYTES,
     };
     return new RoomTiles(options, events);
   }

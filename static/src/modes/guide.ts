@@ -3,10 +3,7 @@
 import { button, element, icon, ICONS } from "../dom.ts";
 import type { Stop } from "../tour.ts";
 import type { Words } from "../words.ts";
-
-/** Letters that are read in a second, and how long one stays at least and at most. */
-const LETTERS_S = 14;
-const STAY_S = [5, 30] as const;
+import { stayS } from "./stay.ts";
 
 /** While it attracts, one stays so long at least. */
 const UNHURRIED_S = 9;
@@ -132,10 +129,8 @@ export class Guide {
 
   get #stay(): number {
     const stop = this.#host.stops[this.#at];
-    if (!stop) return STAY_S[0];
-    if (this.#host.attracts) return stop.seconds ?? UNHURRIED_S;
-    const reading = this.#textOf(stop).length / LETTERS_S + 2;
-    return stop.seconds ?? Math.min(STAY_S[1], Math.max(STAY_S[0], reading));
+    if (stop && this.#host.attracts) return stop.seconds ?? UNHURRIED_S;
+    return stop ? stayS(stop, this.#textOf(stop)) : 0;
   }
 
   #show(): void {

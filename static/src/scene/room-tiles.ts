@@ -26,8 +26,8 @@ import { tinted } from "./tint.ts";
 /** Screen error in pixels above which a tile is replaced by its children. */
 const ERROR_TARGET_PX = 2;
 const MIB = 2 ** 20;
-const CACHE_BYTES = 256 * MIB;
-const CACHE_BYTES_PHONE = 128 * MIB;
+export const CACHE_BYTES = 256 * MIB;
+export const CACHE_BYTES_PHONE = 128 * MIB;
 const ANISOTROPY = 8;
 
 export interface RoomEvents {
@@ -50,7 +50,8 @@ export interface RoomTilesOptions {
   readonly decoder: LoadingManager;
   readonly camera: PerspectiveCamera;
   readonly levels: Levels;
-  readonly phone: boolean;
+  /** How many bytes of tiles are held, at most. */
+  readonly cacheBytes: number;
 }
 
 /** The decoder's folder in that of the viewer; the bundler fills it in. */
@@ -82,7 +83,7 @@ export class RoomTiles {
   #bytes = 0;
 
   constructor(
-    { files, tileset, decoder, camera, levels, phone }: RoomTilesOptions,
+    { files, tileset, decoder, camera, levels, cacheBytes }: RoomTilesOptions,
     events: RoomEvents,
   ) {
     this.#files = files;
@@ -92,7 +93,7 @@ export class RoomTiles {
     tiles.manager = decoder;
     tiles.errorTarget = levels === "view" ? ERROR_TARGET_PX : 0;
     tiles.maxDepth = 1;
-    tiles.lruCache.maxBytesSize = phone ? CACHE_BYTES_PHONE : CACHE_BYTES;
+    tiles.lruCache.maxBytesSize = cacheBytes;
     tiles.lruCache.minBytesSize = tiles.lruCache.maxBytesSize * 0.75;
     tiles.setCamera(camera);
     tiles.registerPlugin({ fetchData: (url: string, init: RequestInit) => this.#fetch(url, init) });
@@ -116,6 +117,11 @@ export class RoomTiles {
   get busy(): boolean {
     const { queued, downloading, parsing } = statsOf(this.#tiles);
     return this.#stale || !this.#rootShown || queued + downloading + parsing > 0;
+  }
+
+  /** Whether tiles did not come that are asked for again later. */
+  get lacks(): boolean {
+    return this.#failed.size > 0;
   }
 
   /** Tiles on screen. */
@@ -183,6 +189,9 @@ export class RoomTiles {
   }
 
   #loaded(scene: Object3D, tile: Tile): void {
+    scene.traverse((object) => {
+      object.name = tile.content?.uri ?? "";
+    });
     for (const material of materialsOf(scene)) {
       if (material.map) material.map.anisotropy = ANISOTROPY;
       tinted(material);

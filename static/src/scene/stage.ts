@@ -84,8 +84,20 @@ export class Stage {
     this.#isPaused = true;
     this.renderer.setAnimationLoop((now) => {
       frame(now);
-      this.renderer.render(this.scene, this.camera);
+      this.render();
     });
+  }
+
+  /** Stops the loop for good: pictures are drawn by `render` alone, each as sharp as can be. */
+  hold(): void {
+    cancelAnimationFrame(this.#scheduled);
+    this.#scheduled = 0;
+    this.#isPaused = true;
+  }
+
+  /** Draws a picture at once. */
+  render(): void {
+    this.renderer.render(this.scene, this.camera);
   }
 
   /** Takes the loop back. */
@@ -123,7 +135,7 @@ export class Stage {
 
   /** Hands the picture out as a PNG. */
   picture(take: (picture: Blob) => void): void {
-    this.renderer.render(this.scene, this.camera); // or what is drawn may be gone already
+    this.render(); // or what is drawn may be gone already
     this.renderer.domElement.toBlob((picture) => {
       if (picture) take(picture);
     });
@@ -140,7 +152,7 @@ export class Stage {
     }
     if (this.#dirty) {
       this.#dirty = false;
-      this.renderer.render(this.scene, this.camera);
+      this.render();
     }
     this.#before = pace === "still" ? null : now;
     if (pace !== "still") this.wake();

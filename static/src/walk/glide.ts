@@ -43,11 +43,21 @@ export class Glide {
     this.#look(0);
   }
 
+  /** How long the whole way takes. */
+  get seconds(): number {
+    return this.#seconds;
+  }
+
   /** Goes on for `dt` seconds. Returns whether there is more to come. */
   step(dt: number): boolean {
     this.#gone = Math.min(this.#seconds, this.#gone + dt);
-    this.#look(this.#gone / this.#seconds);
+    this.at(this.#gone);
     return this.#gone < this.#seconds;
+  }
+
+  /** Puts eye and look where they are after so many seconds. */
+  at(seconds: number): void {
+    this.#look(seconds / this.#seconds);
   }
 
   #look(part: number): void {
@@ -70,7 +80,7 @@ export class Glide {
 }
 
 /** Turns one direction a part of the way toward another. */
-function toward(direction: Vector3, other: Vector3, part: number): void {
+export function toward(direction: Vector3, other: Vector3, part: number): void {
   const angle = direction.angleTo(other);
   if (angle < 1e-4 || part <= 0) return;
   const axis = new Vector3().crossVectors(direction, other);
@@ -79,7 +89,7 @@ function toward(direction: Vector3, other: Vector3, part: number): void {
 }
 
 /** From 0 to 1 with no jerk at either end. */
-function ease(part: number): number {
+export function ease(part: number): number {
   const t = Math.min(1, Math.max(0, part));
   return t * t * t * (t * (6 * t - 15) + 10);
 }

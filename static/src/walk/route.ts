@@ -16,7 +16,7 @@ const MISSED_M = 0.1;
 /** Floors so far apart in height are not the same. */
 const LEVEL_M = 0.6;
 /** Beyond this a click is not worth the wait. */
-const PLACES_MAX = 250;
+export const PLACES_OF_A_CLICK = 250;
 /** More than 1 prefers places toward the goal to the very shortest way. */
 const HASTE = 1.3;
 const SPEED_M_S = 1;
@@ -38,24 +38,37 @@ interface Place {
  * @param from Feet, metres.
  * @param goal On the floor, metres.
  * @param within Near enough to the goal, metres.
+ * @param places So many are looked at before the search gives up.
  */
-export function planRoute(ghost: Walker, from: Vector3, goal: Vector3, within: number): Vector3[] {
+export function planRoute(
+  ghost: Walker,
+  from: Vector3,
+  goal: Vector3,
+  within: number,
+  places = PLACES_OF_A_CLICK,
+): Vector3[] {
   if (isThere(send(ghost, from, goal), goal, within)) return [goal];
   const near = Math.max(within, CELL_M);
-  const last = search(ghost, from, goal, near);
-  const places: Vector3[] = [];
-  for (let place: Place | null = last; place; place = place.before) places.unshift(place.feet);
-  const route = straighten(ghost, places);
+  const last = search(ghost, from, goal, near, places);
+  const feet: Vector3[] = [];
+  for (let place: Place | null = last; place; place = place.before) feet.unshift(place.feet);
+  const route = straighten(ghost, feet);
   return isThere(last.feet, goal, near) ? [...route, goal] : route;
 }
 
 /** The place nearest to the goal, with the places that lead there. */
-function search(ghost: Walker, from: Vector3, goal: Vector3, near: number): Place {
+function search(
+  ghost: Walker,
+  from: Vector3,
+  goal: Vector3,
+  near: number,
+  places: number,
+): Place {
   const start: Place = { feet: from.clone(), before: null, gone: 0, rank: 0 };
   const open = [start];
   const seen = new Set([cellOf(from)]);
   let nearest = start;
-  for (let looked = 0; looked < PLACES_MAX; looked++) {
+  for (let looked = 0; looked < places; looked++) {
     const place = takeBest(open);
     if (!place) break;
     if (place.feet.distanceTo(goal) < nearest.feet.distanceTo(goal)) nearest = place;

@@ -9,7 +9,8 @@ import type { Wish } from "./keyboard.ts";
 import { Look } from "./look.ts";
 import { planRoute } from "./route.ts";
 import type { Link, View } from "../tour.ts";
-import { EYE_M, Walker, type Bounds } from "./walker.ts";
+import { Walker, type Bounds } from "./walker.ts";
+import { wayOfEye } from "./way.ts";
 
 const WALK_M_S = 1.7;
 const RUN_M_S = 3.4;
@@ -24,8 +25,6 @@ const CUT_STEPS = 400;
 const PLACE_WITHIN_M = 0.06;
 /** The search for a way looks at every so many metres of it. */
 const GHOST_STRIDE_M = 0.12;
-/** Who glides to within so far of a place has found a way on foot. */
-const WAY_WITHIN_M = 0.35;
 /** An eye so much higher or lower than a person's hangs in the air. */
 const AFLOAT_M = 0.5;
 /** How near to a door's place a walk must come that a click on the door began. */
@@ -215,19 +214,9 @@ export class Visitor {
     }
   }
 
-  /** Places of the eye on the way to a goal: along the floor, else straight; null if blocked. */
   #pathTo(goal: Vector3): Vector3[] | null {
-    const walker = this.#walker;
-    const ghost = this.#ghost;
-    if (!walker || !ghost) return null;
-    const floor = goal.clone().setZ(goal.z - EYE_M);
-    const route = planRoute(ghost, walker.feet, floor, PLACE_WITHIN_M);
-    const last = route[route.length - 1];
-    if (last && last.distanceTo(floor) < WAY_WITHIN_M) {
-      const eyes = route.map((feet) => feet.clone().setZ(feet.z + EYE_M));
-      return [this.eye.clone(), ...eyes.slice(0, -1), goal];
-    }
-    return this.#collider?.blocks(this.eye, goal, 0) ? null : [this.eye.clone(), goal];
+    if (!this.#walker || !this.#ghost || !this.#collider) return null;
+    return wayOfEye(this.#ghost, this.#collider, this.#walker.feet, this.eye, goal);
   }
 
   #walk(walker: Walker, ahead: number, left: number, speed: number, dt: number): void {
