@@ -1,6 +1,11 @@
-/** The viewer's entry: reads what the page says, opens its room, or shows the plain page. */
+/**
+ * The viewer's entry: lets the page stand, then opens its room, or shows the plain page.
+ *
+ * The poster is all that a visitor waits for: whatever the room needs is asked for after it.
+ */
 
-import { element } from "./dom.ts";
+import { element, isTouch, pause } from "./dom.ts";
+import { Prefetch } from "./scene/prefetch.ts";
 import { fetchTour, roomCalled, startOf } from "./tour.ts";
 import { chooseLanguage, wordsIn } from "./words.ts";
 
@@ -8,13 +13,18 @@ import { chooseLanguage, wordsIn } from "./words.ts";
 declare const DRACO_FOLDER: string;
 
 const PATIENCE_MS = 500;
+/** A phone that begins a room hears no finger for seconds: so long its page can be read before. */
+const READING_MS = 2500;
 
 async function main(): Promise<void> {
   const host = document.getElementById("tour");
   if (!host) throw new Error("page: expected an element with id `tour`, found none");
   const site = new URL(host.dataset["site"] ?? "./", location.href);
   const words = wordsIn(chooseLanguage(["en", "fr"], navigator.languages));
-  if (!canDraw()) return showPlain(host, words.noWebgl);
+  keepIcon();
+  const touched = touch();
+  await Promise.race([touched, quiet(host)]);
+  askForScripts(host, site);
   let tour;
   try {
     tour = await fetchTour(new URL("tour.json", site));
@@ -23,12 +33,14 @@ async function main(): Promise<void> {
     showPlain(host, words.noTour, words.retry);
     return;
   }
-  keepIcon();
-  await quiet(host);
-  const decoder = new URL(DRACO_FOLDER, import.meta.url);
   const asked = roomCalled(tour, host.dataset["room"] ?? null);
+  const room = asked ?? startOf(tour);
+  void new Prefetch(site, tour).room(room);
+  if (isTouch()) await Promise.race([touched, pause(READING_MS)]);
+  if (!canDraw()) return showPlain(host, words.noWebgl);
+  const decoder = new URL(DRACO_FOLDER, import.meta.url);
   const { Visit } = await import("./visit.ts");
-  new Visit(host, site, decoder, tour, asked ?? startOf(tour)).start(asked === null);
+  new Visit(host, site, decoder, tour, room).start(asked === null);
 }
 
 /** The page's address will change with the rooms; what it names relatively must not. */
@@ -37,20 +49,32 @@ function keepIcon(): void {
   if (icon) icon.href = new URL(icon.href).href;
 }
 
-/** Waits until the page stands and nothing else is to be done, or the visitor asks for the room. */
-function quiet(host: HTMLElement): Promise<void> {
+/** Resolves when the visitor does anything to the page. */
+function touch(): Promise<void> {
   return new Promise((done) => {
-    const start = (): void => done();
-    for (const asked of ["pointerdown", "keydown", "focusin"]) {
-      host.ownerDocument.addEventListener(asked, start, { once: true, passive: true });
+    for (const kind of ["pointerdown", "keydown", "focusin"]) {
+      document.addEventListener(kind, () => done(), { once: true, passive: true });
     }
-    const idle = (): void => {
-      if ("requestIdleCallback" in window) requestIdleCallback(start, { timeout: PATIENCE_MS });
-      else setTimeout(start, 0); // Safari
-    };
-    if (document.readyState === "complete") idle();
-    else window.addEventListener("load", idle, { once: true });
   });
+}
+
+/** Resolves when the page is loaded, its poster shown, and nothing else is to be done. */
+async function quiet(host: HTMLElement): Promise<void> {
+  if (document.readyState !== "complete") {
+    await new Promise((done) => window.addEventListener("load", done, { once: true }));
+  }
+  await host.querySelector("img")?.decode().catch(() => undefined); // it shows no picture, then
+  await new Promise((done) => new PerformanceObserver(done).observe({ type: "paint", buffered: true }));
+  if (!("requestIdleCallback" in window)) return; // Safari
+  await new Promise((done) => requestIdleCallback(done, { timeout: PATIENCE_MS }));
+}
+
+/** Asks at once for all scripts that the visit consists of, as the page names them. */
+function askForScripts(host: HTMLElement, site: URL): void {
+  for (const name of host.dataset["scripts"]?.split(" ") ?? []) {
+    const href = new URL(`viewer/${name}`, site).href;
+    document.head.append(element("link", { rel: "modulepreload", href }));
+  }
 }
 
 function canDraw(): boolean {

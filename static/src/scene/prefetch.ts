@@ -1,4 +1,4 @@
-/** Fetches the rooms next door ahead, so that a door opens at once. */
+/** Fetches rooms ahead: the first while its page stands, those next door so that they open at once. */
 
 import type { Room, Tour } from "../tour.ts";
 
@@ -23,12 +23,12 @@ export class Prefetch {
       const next = this.#tour.rooms.find(({ id }) => id === to);
       if (!next || this.#done.has(next.id)) continue;
       this.#done.add(next.id);
-      await this.#room(next);
+      await this.room(next);
     }
   }
 
   /** Poster, tileset and root tile, into the browser's cache. A failure costs nothing. */
-  async #room(room: Room): Promise<void> {
+  async room(room: Room): Promise<void> {
     try {
       new Image().src = new URL(room.poster, this.#site).href;
       const tileset = new URL(room.tileset, this.#site);
