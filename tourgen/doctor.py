@@ -33,6 +33,10 @@ BENCH_LIBRARIES = {
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 """Programs that can draw a tour for the tests, the best known first."""
 
+TEST_PROGRAMS = {"firefox-esr": "firefox-esr", "Xvfb": "xvfb"}
+"""Programs that the tests run beside Chromium, and the Debian package of each: the other browser,
+and the screen that it needs to draw on."""
+
 GIB = 1 << 30
 DISK_NEEDED = 2 * GIB
 """Bytes: scans, cache and site of a tour of three rooms."""
@@ -80,6 +84,8 @@ def findings(folder: Path, *, tests: bool = False, bench: bool = False) -> list[
                 package="chromium",
             )
         )
+    if tests:
+        found += _programs()
     return found
 
 
@@ -98,6 +104,13 @@ def _libraries(wanted: Mapping[str, str], by: str) -> Iterator[Finding]:
         except OSError as error:
             mend = _install_line(package, of=library)
             yield Finding(library, f"needed by {by}, {error}", mend, package)
+
+
+def _programs() -> Iterator[Finding]:
+    for program, package in TEST_PROGRAMS.items():
+        if shutil.which(program) is None:
+            fault = "needed by the browser tests, not found on the path"
+            yield Finding(program, fault, _install_line(package, of=program), package)
 
 
 def _install_line(package: str, *, of: str) -> str:
