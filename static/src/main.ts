@@ -6,7 +6,7 @@
 
 import { element, isTouch, pause } from "./dom.ts";
 import { DECODER } from "./scene/decoder.ts";
-import { Prefetch } from "./scene/prefetch.ts";
+import { askForRoom } from "./scene/prefetch.ts";
 import { fetchTour, roomCalled, startOf } from "./tour.ts";
 import { chooseLanguage, wordsIn } from "./words.ts";
 
@@ -37,7 +37,7 @@ async function main(): Promise<void> {
   }
   const asked = roomCalled(tour, host.dataset["room"] ?? null);
   const room = asked ?? startOf(tour);
-  void new Prefetch(site, tour).room(room);
+  void askForRoom(site, room);
   if (isTouch()) await Promise.race([touched, pause(READING_MS)]);
   if (!canDraw()) return showPlain(host, words.noWebgl);
   const { Visit } = await import("./visit.ts");

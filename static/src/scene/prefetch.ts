@@ -1,9 +1,22 @@
 /** Fetches rooms ahead: the first while its page stands, those next door so that they open at once. */
 
+import { askAhead } from "./ahead.ts";
 import type { Room, Tour } from "../tour.ts";
 
 interface TilesetRoot {
   readonly root: { readonly content?: { readonly uri: string } };
+}
+
+/** Asks for what a room is opened with, to be handed over; a failure is told when it is opened. */
+export async function askForRoom(site: URL, room: Room): Promise<void> {
+  const tileset = new URL(room.tileset, site);
+  try {
+    const response = await askAhead(tileset);
+    const { root } = (await response.json()) as TilesetRoot;
+    if (root.content) await (await askAhead(new URL(root.content.uri, tileset))).body?.cancel();
+  } catch {
+    return;
+  }
 }
 
 export class Prefetch {
@@ -23,12 +36,12 @@ export class Prefetch {
       const next = this.#tour.rooms.find(({ id }) => id === to);
       if (!next || this.#done.has(next.id)) continue;
       this.#done.add(next.id);
-      await this.room(next);
+      await this.#room(next);
     }
   }
 
   /** Poster, tileset and root tile, into the browser's cache. A failure costs nothing. */
-  async room(room: Room): Promise<void> {
+  async #room(room: Room): Promise<void> {
     try {
       new Image().src = new URL(room.poster, this.#site).href;
       const tileset = new URL(room.tileset, this.#site);

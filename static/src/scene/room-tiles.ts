@@ -18,6 +18,7 @@ import {
 import { DRACOLoader } from "three/addons/loaders/DRACOLoader.js";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { Collider } from "../walk/collider.ts";
+import { handedOver } from "./ahead.ts";
 import { Backoff } from "./backoff.ts";
 import { BINARY, WRAPPER } from "./decoder.ts";
 import { boxOf, checkerboard, type Levels } from "./levels.ts";
@@ -197,7 +198,7 @@ export class RoomTiles {
 
   /** Counts what comes, and tells how much of the root tile is there. */
   async #fetch(url: string, init: RequestInit): Promise<ArrayBuffer | object> {
-    const response = await fetch(url, init);
+    const response = (await handedOver(url)) ?? (await fetch(url, init));
     if (!response.ok) throw new Error(`${url}: the server answered ${response.status}`);
     if (this.#rootShown || !response.body || !url.endsWith(".glb")) {
       const data = await response.arrayBuffer();
