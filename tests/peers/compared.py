@@ -58,7 +58,8 @@ class Row:
 def compared(browser: Browser, tour: Path, room: str, scratch: Path) -> list[Row]:
     """Ours first, then every viewer with the file of every packer."""
     site, folder = tour / "site", scratch / room
-    folder.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     whole = folder / "whole.glb"
     write_lossless(leaves_of(tour, room), whole)
     entry = rooms_of(site)[room]["entry"]

@@ -16,7 +16,7 @@ _PATIENCE_S = 1200
 
 
 def packed(whole: Path, packer: str, quality: int) -> Path:
-    """Pack a lossless GLB, every face and texel of it; kept beside it for the next time."""
+    """Pack a lossless GLB, every face and texel of it, into a file beside it, once."""
     pictures = whole.with_name(f"webp-{quality}.glb")
     out = whole.with_name(f"{packer}-{quality}.glb")
     if out.exists():

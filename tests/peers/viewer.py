@@ -64,15 +64,22 @@ def main() -> int:
     given = parser.parse_args()
     site = given.demo.resolve() / "site"
     rooms = given.room or list(rooms_of(site))
-    text = [PREAMBLE, _budgets(site, rooms), COMPARISON]
-    with _chromium() as browser:
-        for room in rooms:
-            rows = compared(browser, given.demo.resolve(), room, given.scratch.resolve())
-            text.append(_table(room, rows))
-    print("\n".join(text), flush=True)
+    text = [PREAMBLE]
+    for part in _parts(given.demo.resolve(), rooms, given.scratch.resolve()):
+        print(part, flush=True)
+        text.append(part)
     if given.write:
         rewrite(given.write, HEADING, "\n".join(text))
     return 0
+
+
+def _parts(tour: Path, rooms: Sequence[str], scratch: Path) -> Iterator[str]:
+    """The section, piece by piece as it is found."""
+    yield _budgets(tour / "site", rooms)
+    yield COMPARISON
+    with _chromium() as browser:
+        for room in rooms:
+            yield _table(room, compared(browser, tour, room, scratch))
 
 
 @contextmanager
