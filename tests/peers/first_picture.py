@@ -24,6 +24,14 @@ ALIKE_DB = 24.0
 _NEAR_VOID = 60
 _SLACK = 1e-4
 _PATIENCE_S = 120
+_WATCHED = """
+const look = () => {{
+  if (!({done})) requestAnimationFrame(look);
+  else window.doneAt = (performance.timeOrigin + performance.now()) / 1000;
+}};
+look();
+"""
+"""Notes in the page when nothing is missing any more: what it fetches later for others is later."""
 
 
 @dataclass(frozen=True)
@@ -107,13 +115,13 @@ def loaded(browser: Browser, url: str, done: str, before: str = "") -> Loading:
     Raises:
         SystemExit: It never shows a whole picture.
     """
-    page = _page(browser, before)
+    page = _page(browser, before + _WATCHED.format(done=done))
     watch = _Watch(slowed(page))
     watch.session.send("Page.startScreencast", {"format": "png"})
     begun = time.time()
     page.goto(url, wait_until="commit")
-    _wait(page, done)
-    ended = time.time()
+    _wait(page, "window.doneAt")
+    ended = page.evaluate("window.doneAt")
     sharp = _settled(page)
     watch.session.send("Page.stopScreencast")
     page.context.close()
