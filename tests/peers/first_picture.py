@@ -132,11 +132,16 @@ def loaded(browser: Browser, url: str, done: str, before: str = "") -> Loading:
     raise SystemExit(f"{url}: expected a whole picture, found {len(watch.pictures)} others")
 
 
-def sharp_picture(browser: Browser, url: str, done: str, before: str = "") -> Picture:
-    """What a page shows in the end."""
+def sharp_picture(
+    browser: Browser, url: str, done: str, before: str = "", then: str = ""
+) -> Picture:
+    """What a page shows in the end, after a last script if there is one."""
     page = _page(browser, before)
     page.goto(url, wait_until="commit")
     _wait(page, done)
+    if then:
+        page.evaluate(then)
+        _wait(page, done)
     picture = _settled(page)
     page.context.close()
     return picture
