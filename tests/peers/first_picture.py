@@ -15,6 +15,7 @@ import numpy as np
 from net import slowed
 from PIL import Image
 from playwright.sync_api import Browser, CDPSession, Page
+from scipy.ndimage import binary_dilation
 from visitor import Picture, psnr_db
 
 SIZE = (960, 540)
@@ -23,6 +24,8 @@ VOID = (255, 0, 255)
 ALIKE_DB = 24.0
 _NEAR_VOID = 60
 _SLACK = 1e-4
+_RIM_PX = 4
+"""A coarse opening's rim lies so far from the fine one's at most: that is no hole."""
 _PATIENCE_S = 120
 _WATCHED = """
 const look = () => {{
@@ -179,7 +182,8 @@ def _settled(page: Page) -> Picture:
 def _is_whole(picture: Picture, sharp: Picture) -> bool:
     if picture.shape != sharp.shape:
         return False
-    holes = _is_void(picture) & ~_is_void(sharp)
+    openings = binary_dilation(_is_void(sharp), iterations=_RIM_PX)
+    holes = _is_void(picture) & ~openings
     return bool(holes.mean() <= _SLACK) and psnr_db(picture, sharp) >= ALIKE_DB
 
 
