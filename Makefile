@@ -17,6 +17,7 @@ help:
 	@echo "make bench-fidelity   every method and its peers against it (BENCH='--room chamber1')"
 	@echo "make bench-speed      time and memory beside what one does by hand (BENCH='--points 1300000')"
 	@echo "make bench-rooms      how many rooms use two cores"
+	@echo "make bench-viewer     what a visit takes, and other viewers beside it (BENCH='--room stairs')"
 	@echo "make soak        a build killed at 30 moments, half an hour of wandering, hours of a kiosk"
 	@echo "make pictures    screenshots of the demo for README and docs"
 	@echo "make lock        pin the newest versions, with their hashes"
@@ -78,6 +79,10 @@ tests/node_modules/.package-lock.json: tests/package-lock.json | $(VENV)/.packag
 	cd tests && $(NPM) ci --no-audit --no-fund --ignore-scripts
 	@touch $@
 
+tests/peers/node_modules/.package-lock.json: tests/peers/package-lock.json | $(VENV)/.packages
+	cd tests/peers && $(NPM) ci --no-audit --no-fund --ignore-scripts
+	@touch $@
+
 # ---- What is made
 
 .PHONY: demo
@@ -131,6 +136,12 @@ bench-speed: demo system-bench $(VENV)/.bench
 bench-rooms: demo
 	$(BIN)/python tests/peers/many_rooms.py --demo $(DEMO) --write docs/benchmarks.md $(BENCH)
 
+# And so too.
+.PHONY: bench-viewer
+bench-viewer: demo system-tests tests/node_modules/.package-lock.json \
+		tests/peers/node_modules/.package-lock.json
+	$(BIN)/python tests/peers/viewer.py $(DEMO) --write docs/benchmarks.md $(BENCH)
+
 # ---- What is kept up
 
 # Without the configuration of this machine, so that no address or path of it is written.
@@ -147,11 +158,12 @@ lock: $(VENV)/.packages
 		-o requirements/test.txt && \
 	$(COMPILE) pyproject.toml --extra bench -c requirements/test.txt -o requirements/bench.txt
 	rm -rf $(VENV)/lock
-	for folder in static tests; do \
+	for folder in static tests tests/peers; do \
 		(cd $$folder && rm -f package-lock.json && $(NPM) install --package-lock-only --ignore-scripts); \
 	done
 
 .PHONY: clean
 clean:
-	rm -rf $(VENV) static/dist static/node_modules tests/node_modules dist build \
+	rm -rf $(VENV) static/dist static/node_modules tests/node_modules \
+		tests/peers/node_modules dist build \
 		sites/*/scans sites/*/sounds sites/*/truth sites/*/site sites/*/.tourgen

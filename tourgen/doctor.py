@@ -30,11 +30,12 @@ BENCH_LIBRARIES = {
 }
 """What ``import pymeshlab`` loads besides, for the benches."""
 
-TEST_PROGRAMS = {"Xvfb": "xvfb", "xdotool": "xdotool"}
-"""A screen and hands for the tests of the kiosk, and the Debian package of each."""
-
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 """Programs that can draw a tour for the tests, the best known first."""
+
+TEST_PROGRAMS = {"firefox-esr": "firefox-esr", "Xvfb": "xvfb", "xdotool": "xdotool"}
+"""Programs that the tests run beside Chromium, and the Debian package of each: the other browser,
+a screen, and hands for the kiosk."""
 
 GIB = 1 << 30
 DISK_NEEDED = 2 * GIB
@@ -74,8 +75,6 @@ def findings(folder: Path, *, tests: bool = False, bench: bool = False) -> list[
     found = [*_libraries(LIBRARIES, "Open3D"), *_disk(folder), *_memory()]
     if bench:
         found += _libraries(BENCH_LIBRARIES, "PyMeshLab")
-    if tests:
-        found += _programs(TEST_PROGRAMS)
     if tests and browser() is None:
         found.append(
             Finding(
@@ -85,6 +84,8 @@ def findings(folder: Path, *, tests: bool = False, bench: bool = False) -> list[
                 package="chromium",
             )
         )
+    if tests:
+        found += _programs(TEST_PROGRAMS)
     return found
 
 

@@ -7,6 +7,11 @@ export interface Files {
   locate(path: string): URL;
   /** Brings what lies somewhere, as the browser's own `fetch` does. */
   fetch(at: URL | string, init?: RequestInit): Promise<Response>;
+  /**
+   * Asks for a file before whoever needs it runs: the next `fetch` of it is handed the answer. The
+   * caller gets one of its own.
+   */
+  ask(at: URL): Promise<Response>;
   /** The address that a picture or a sound shows a file by. */
   source(path: string): string;
 }
@@ -14,6 +19,7 @@ export interface Files {
 /** Files below a folder of a server. */
 export class SiteFiles implements Files {
   readonly home: URL;
+  readonly #coming = new Map<string, Promise<Response | null>>();
 
   constructor(site: URL) {
     this.home = site;
@@ -23,8 +29,17 @@ export class SiteFiles implements Files {
     return new URL(path, this.home);
   }
 
-  fetch(at: URL | string, init?: RequestInit): Promise<Response> {
-    return fetch(at, init);
+  async fetch(at: URL | string, init?: RequestInit): Promise<Response> {
+    const coming = this.#coming.get(String(at)) ?? null;
+    this.#coming.delete(String(at));
+    return (await coming) ?? fetch(at, init);
+  }
+
+  ask(at: URL): Promise<Response> {
+    const answer = fetch(at, { priority: "low" });
+    const own = answer.then((response) => response.clone());
+    this.#coming.set(at.href, own.catch(() => null));
+    return answer;
   }
 
   source(path: string): string {
@@ -57,6 +72,10 @@ export class CarriedFiles implements Files {
     const path = decodeURIComponent(new URL(at).pathname.slice(1));
     if (!this.#carriers.has(path)) return new Response(null, { status: 404 });
     return fetch(this.source(path), init);
+  }
+
+  ask(at: URL): Promise<Response> {
+    return this.fetch(at);
   }
 
   source(path: string): string {

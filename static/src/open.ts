@@ -1,14 +1,21 @@
-/** Opens the room that page and address say, or shows the plain page. */
+/**
+ * Lets the page stand, then opens the room that page and address say, or shows the plain page. The
+ * poster is all that a visitor waits for: whatever the room needs is asked for after it.
+ */
 
 import { takeAlongInTime } from "./along/along.ts";
 import type { Addresses } from "./address.ts";
-import { element } from "./dom.ts";
+import { element, isTouch, pause } from "./dom.ts";
 import type { Files } from "./files.ts";
 import { kioskSettings } from "./kiosk/settings.ts";
+import { BINARY, WRAPPER } from "./scene/decoder.ts";
+import { askForRoom } from "./scene/prefetch.ts";
 import { fetchTour, roomCalled, startOf } from "./tour.ts";
 import { chooseLanguage, wordsIn } from "./words.ts";
 
 const PATIENCE_MS = 500;
+/** A phone that begins a room hears no finger for seconds: so long its page can be read before. */
+const READING_MS = 2500;
 
 /** The page's element that the tour goes into. */
 export function hostIn(page: Document): HTMLElement {
@@ -33,7 +40,12 @@ export async function open(
     plain?.();
     showPlain(host, message, retry);
   };
-  if (!canDraw()) return give(words.noWebgl);
+  const films = new URLSearchParams(location.search).has("film");
+  const kiosk = host.dataset["kiosk"];
+  keepIcon();
+  const touched = touch();
+  if (!films) await Promise.race([touched, quiet(host)]);
+  if (files.home) askAhead(host, files);
   let tour;
   try {
     tour = await fetchTour(files);
@@ -41,20 +53,20 @@ export async function open(
     console.warn(error);
     return give(words.noTour, words.retry);
   }
-  if (new URLSearchParams(location.search).has("film")) {
+  if (films) {
     const { Film } = await import("./film/film.ts");
     new Film(host, files, tour);
     return;
   }
-  keepIcon();
-  await quiet(host);
   const named = addresses.roomAt(new URL(location.href)) ?? host.dataset["room"] ?? null;
   const asked = roomCalled(tour, named);
   const room = asked ?? startOf(tour);
-  const told = host.dataset["kiosk"];
-  if (told !== undefined) {
+  if (files.home) void askForRoom(files, room);
+  if (isTouch() && kiosk === undefined) await Promise.race([touched, pause(READING_MS)]);
+  if (!canDraw()) return give(words.noWebgl);
+  if (kiosk !== undefined) {
     const { openKiosk } = await import("./kiosk/open.ts");
-    return openKiosk(host, files, addresses, tour, room, kioskSettings(told));
+    return openKiosk(host, files, addresses, tour, room, kioskSettings(kiosk));
   }
   const { Visit } = await import("./visit.ts");
   const manner = { kiosk: false, opened: () => undefined, home: () => undefined };
@@ -68,20 +80,40 @@ function keepIcon(): void {
   if (icon) icon.href = new URL(icon.href).href;
 }
 
-/** Waits until the page stands and nothing else is to be done, or the visitor asks for the room. */
-function quiet(host: HTMLElement): Promise<void> {
+/** Resolves when the visitor does anything to the page. */
+function touch(): Promise<void> {
   return new Promise((done) => {
-    const start = (): void => done();
-    for (const asked of ["pointerdown", "keydown", "focusin"]) {
-      host.ownerDocument.addEventListener(asked, start, { once: true, passive: true });
+    for (const kind of ["pointerdown", "keydown", "focusin"]) {
+      document.addEventListener(kind, () => done(), { once: true, passive: true });
     }
-    const idle = (): void => {
-      if ("requestIdleCallback" in window) requestIdleCallback(start, { timeout: PATIENCE_MS });
-      else setTimeout(start, 0); // Safari
-    };
-    if (document.readyState === "complete") idle();
-    else window.addEventListener("load", idle, { once: true });
   });
+}
+
+/** Resolves when the page is loaded, its poster shown, and nothing else is to be done. */
+async function quiet(host: HTMLElement): Promise<void> {
+  if (document.readyState !== "complete") {
+    await new Promise((done) => window.addEventListener("load", done, { once: true }));
+  }
+  await host.querySelector("img")?.decode().catch(() => undefined); // it shows no picture, then
+  const painted = new Promise((done) =>
+    new PerformanceObserver(done).observe({ type: "paint", buffered: true }),
+  );
+  await Promise.race([painted, pause(PATIENCE_MS)]);
+  // What was decoded is on screen two frames later at the latest.
+  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  if (!("requestIdleCallback" in window)) return; // Safari
+  await new Promise((done) => requestIdleCallback(done, { timeout: PATIENCE_MS }));
+}
+
+/** Asks at once for all scripts that the visit consists of, as the page names them, and decoder. */
+function askAhead(host: HTMLElement, files: Files): void {
+  for (const name of host.dataset["scripts"]?.split(" ") ?? []) {
+    const href = files.source(`viewer/${name}`);
+    document.head.append(element("link", { rel: "modulepreload", href }));
+  }
+  for (const path of [WRAPPER, BINARY]) {
+    void files.fetch(files.locate(path), { priority: "low" }).catch(() => undefined); // asked again
+  }
 }
 
 function canDraw(): boolean {

@@ -13,6 +13,8 @@ import type { Stage } from "./scene/stage.ts";
 import { startOf, type Room, type Tour, type View } from "./tour.ts";
 
 const FADE_MS = 280;
+/** So long nothing was to be done before other rooms are fetched: between levels there is a lull. */
+const LULL_MS = 700;
 
 type Phase = "opening" | "open" | "failed";
 
@@ -38,6 +40,7 @@ export class Rooms {
   #phase: Phase = "opening";
   #tiles: RoomTiles | null = null;
   #collider: Collider | null = null;
+  #lull: ReturnType<typeof setTimeout> | undefined;
   /** Counts the rooms entered, so that what comes late for an earlier one is known. */
   #entered = 0;
 
@@ -88,6 +91,7 @@ export class Rooms {
     const turn = ++this.#entered;
     this.#room = room;
     this.#phase = "opening";
+    this.lookAhead(true);
     this.#front.expect(room, passing);
     if (this.#tiles && !prefersStillness()) await pause(FADE_MS);
     if (turn !== this.#entered) return;
@@ -123,9 +127,17 @@ export class Rooms {
     return new RoomTiles(options, events);
   }
 
-  /** Fetches the rooms next door while nothing else is to be done. */
-  lookAhead(): void {
-    void this.#prefetch.neighbours(this.#room);
+  /**
+   * Fetches the rooms next door when nothing else is to be done any more.
+   *
+   * @param busy Whether something is.
+   */
+  lookAhead(busy: boolean): void {
+    if (!busy && this.#lull !== undefined) return;
+    clearTimeout(this.#lull);
+    this.#lull = busy
+      ? undefined
+      : setTimeout(() => void this.#prefetch.neighbours(this.#room), LULL_MS);
   }
 
   #leave(): void {

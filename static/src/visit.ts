@@ -538,7 +538,7 @@ export class Visit {
     this.#tools.frame();
     const guided = this.#guide?.frame(dt) ?? false;
     const busy = (tiles?.busy ?? false) || (this.#overview?.busy ?? false);
-    if (!busy && this.#rooms.isOpen) this.#rooms.lookAhead();
+    if (this.#rooms.isOpen) this.#rooms.lookAhead(busy);
     if (moved) return "moving";
     if (guided) return "watching";
     if (busy && !this.#rooms.hasFailed) return "waiting";

@@ -1,10 +1,22 @@
-/** Fetches the rooms next door ahead, so that a door opens at once. */
+/** Fetches rooms ahead: the first while its page stands, those next door so that they open at once. */
 
 import type { Files } from "../files.ts";
 import type { Room, Tour } from "../tour.ts";
 
 interface TilesetRoot {
   readonly root: { readonly content?: { readonly uri: string } };
+}
+
+/** Asks for what a room is opened with, to be handed over; a failure is told when it is opened. */
+export async function askForRoom(files: Files, room: Room): Promise<void> {
+  const tileset = files.locate(room.tileset);
+  try {
+    const response = await files.ask(tileset);
+    const { root } = (await response.json()) as TilesetRoot;
+    if (root.content) await (await files.ask(new URL(root.content.uri, tileset))).body?.cancel();
+  } catch {
+    return;
+  }
 }
 
 export class Prefetch {

@@ -20,6 +20,7 @@ import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import type { Files } from "../files.ts";
 import { Collider } from "../walk/collider.ts";
 import { Backoff } from "./backoff.ts";
+import { BINARY, WRAPPER } from "./decoder.ts";
 import { boxOf, checkerboard, type Levels } from "./levels.ts";
 import { tinted } from "./tint.ts";
 
@@ -54,16 +55,13 @@ export interface RoomTilesOptions {
   readonly cacheBytes: number;
 }
 
-/** The decoder's folder in that of the viewer; the bundler fills it in. */
-declare const DRACO_FOLDER: string;
-
 /** What every room's tiles are decoded with; made once. */
 export function tileDecoder(files: Files): LoadingManager {
   const manager = new LoadingManager();
   const draco = new DRACOLoader(manager);
   draco.setDecoderPath({
-    js: files.source(`viewer/${DRACO_FOLDER}draco_wasm_wrapper.js`),
-    wasm: files.source(`viewer/${DRACO_FOLDER}draco_decoder.wasm`),
+    js: files.source(WRAPPER),
+    wasm: files.source(BINARY),
   });
   draco.preload();
   manager.addHandler(/\.glb$/, new GLTFLoader(manager).setDRACOLoader(draco));

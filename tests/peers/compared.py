@@ -1,0 +1,131 @@
+"""A published room beside the same room in one file, shown by other viewers, over one network."""
+
+from __future__ import annotations
+
+import shutil
+import statistics
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from first_picture import ALIKE_DB, Loading, loaded, sharp_picture
+from hosting import Host, hosted
+from lossless import leaves_of, lossless_site, write_lossless
+from one_file import PACKERS, packed
+from other_viewers import DONE, VIEWERS, Eye, page_of, staged
+from playwright.sync_api import Browser
+from published import rooms_of
+from visitor import Picture, psnr_db
+
+from tourgen.headers import SECURITY_HEADERS
+
+__all__ = ["ALIKE_DB", "OURS", "TIMES", "Row", "compared"]
+
+TIMES = 3
+QUALITIES = (40, 50, 60, 70, 80, 85, 90, 95, 100)
+"""Of WebP: the least is taken that comes as near to the lossless picture as ours."""
+OURS = "tourgen"
+SETTLED = "window.tourgen?.idle"
+BARE = """
+const sheet = new CSSStyleSheet();
+sheet.replaceSync('#tour > :not(canvas), .cover { opacity: 0.004 !important }');
+document.adoptedStyleSheets = [sheet];
+"""
+"""The room itself is judged, not its poster, which is far sooner there."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One viewer with one file.
+
+    Attributes:
+        viewer: Its name.
+        file: What was packed how.
+        whole_s: Median until the first whole picture.
+        whole_bytes: Median of what had come by then.
+        sharp_bytes: Median of what had come when sharp.
+        psnr_db: Of the sharp picture to that of the lossless room in the same viewer.
+    """
+
+    viewer: str
+    file: str
+    whole_s: float
+    whole_bytes: float
+    sharp_bytes: float
+    psnr_db: float
+
+
+def compared(browser: Browser, tour: Path, room: str, scratch: Path) -> list[Row]:
+    """Ours first, then every viewer with the file of every packer."""
+    site, folder = tour / "site", scratch / room
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    whole = folder / "whole.glb"
+    write_lossless(leaves_of(tour, room), whole)
+    entry = rooms_of(site)[room]["entry"]
+    eye = Eye(entry["position"], entry["look_at"])
+    ours = _ours(browser, site, room, whole, folder / "lossless", eye)
+    rows = [ours]
+    staged(folder / "pages")
+    with hosted(folder / "pages", {}) as host:
+        for viewer in VIEWERS:
+            show = _shower(browser, host, viewer, eye)
+            lossless = show(whole)
+            for packer in PACKERS:
+                quality, near_db = _equal(show, lossless, ours.psnr_db, whole, packer)
+                file = packed(whole, packer, quality)
+                url = _address(host, viewer, file, eye)
+                runs = [loaded(browser, url, DONE) for _ in range(TIMES)]
+                rows.append(_row(viewer, f"{packer}, WebP {quality}", runs, near_db))
+    return rows
+
+
+def _ours(browser: Browser, site: Path, room: str, whole: Path, aside: Path, eye: Eye) -> Row:
+    page = f"rooms/{room}/index.html?background=ff00ff"
+    lossless_site(site, room, whole, aside)
+    # To the millimetre: one stands on what one sees, and the floors of the two are not the same.
+    there = f"window.tourgen.teleport({list(eye.position)}, {list(eye.look_at)})"
+    pictures = []
+    for folder in (aside, site):
+        with hosted(folder, SECURITY_HEADERS) as host:
+            url = f"{host.origin}/{page}"
+            pictures.append(sharp_picture(browser, url, SETTLED, BARE, there))
+    with hosted(site, SECURITY_HEADERS) as host:
+        runs = [loaded(browser, f"{host.origin}/{page}", SETTLED, BARE) for _ in range(TIMES)]
+    return _row(OURS, "tileset", runs, psnr_db(*pictures))
+
+
+def _row(viewer: str, file: str, runs: list[Loading], near_db: float) -> Row:
+    return Row(
+        viewer,
+        file,
+        statistics.median(run.whole_s for run in runs),
+        statistics.median(run.whole_bytes for run in runs),
+        statistics.median(run.sharp_bytes for run in runs),
+        near_db,
+    )
+
+
+def _shower(browser: Browser, host: Host, viewer: str, eye: Eye) -> Callable[[Path], Picture]:
+    """What a viewer shows of a file in the end."""
+    return lambda file: sharp_picture(browser, _address(host, viewer, file, eye), DONE)
+
+
+def _address(host: Host, viewer: str, file: Path, eye: Eye) -> str:
+    shutil.copy(file, file.parent / "pages/models")
+    return f"{host.origin}/{page_of(viewer, file.name, eye)}"
+
+
+def _equal(
+    show: Callable[[Path], Picture], lossless: Picture, asked_db: float, whole: Path, packer: str
+) -> tuple[int, float]:
+    """The least quality whose picture is as good as ours, or the best there is; and how good."""
+    low, high = 0, len(QUALITIES) - 1
+    found: dict[int, float] = {}
+    while low < high:
+        middle = (low + high) // 2
+        found[middle] = psnr_db(show(packed(whole, packer, QUALITIES[middle])), lossless)
+        low, high = (low, middle) if found[middle] >= asked_db else (middle + 1, high)
+    if low not in found:
+        found[low] = psnr_db(show(packed(whole, packer, QUALITIES[low])), lossless)
+    return QUALITIES[low], found[low]
