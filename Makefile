@@ -113,7 +113,7 @@ lint: install
 soak: install system-tests tests/node_modules/.package-lock.json
 	$(BIN)/pytest tests/commands/test_kills.py --kills 30
 	$(BIN)/pytest tests/browser/test_wander.py --wander 1800
-	$(BIN)/pytest -rP tests/commands/test_kiosk.py --acts 10000
+	$(BIN)/pytest -rP tests/commands/test_kiosk_screen.py --acts 10000
 	$(BIN)/pytest -rP tests/browser/test_kiosk_soak.py --kiosk-visits 160 --kiosk-seconds 3600
 
 .PHONY: bench

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from box_tour import write_box_tour
 from miniature import write_miniature
+from playwright.sync_api import Playwright, sync_playwright
 
 from tourgen.cli import main
 
@@ -30,6 +31,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--kiosk-seconds", type=float, default=10, help="of a kiosk as it goes (make soak: 3600)"
     )
     parser.addoption("--kills", type=int, default=2, help="builds that are killed (make soak: 30)")
+
+
+@pytest.fixture(scope="session")
+def playwright() -> Iterator[Playwright]:
+    """What drives Chromium; a process has one at a time."""
+    with sync_playwright() as driver:
+        yield driver
 
 
 @pytest.fixture(scope="session")

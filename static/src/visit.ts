@@ -214,6 +214,7 @@ export class Visit {
 
   /** Whether a visitor listens or looks on without touching anything. */
   get isBusy(): boolean {
+    if (this.#rooms.hasFailed) return false;
     const attracts = this.#guide?.attracts ?? false;
     return (!attracts && (this.#guide?.isPlaying ?? false)) || this.front.panel.isSounding;
   }

@@ -8,7 +8,7 @@ from threading import Thread
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, Playwright
 from visitor import CHROMIUM, Visit, Visitor, visitor
 
 from tourgen.doctor import browser as find_browser
@@ -16,14 +16,13 @@ from tourgen.serve import open_server
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
+def browser(playwright: Playwright) -> Iterator[Browser]:
     """Chromium, drawing in software."""
     program = find_browser()
     assert program, "chromium: expected on the path, found none; `make test` installs it"
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=program, args=list(CHROMIUM))
-        yield chromium
-        chromium.close()
+    chromium = playwright.chromium.launch(executable_path=program, args=list(CHROMIUM))
+    yield chromium
+    chromium.close()
 
 
 @pytest.fixture(scope="session")

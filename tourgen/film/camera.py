@@ -5,8 +5,9 @@ from __future__ import annotations
 import base64
 import os
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from io import BytesIO
@@ -50,13 +51,15 @@ _LOOKS_EVERY_S: Final = 0.02
 class Camera:
     """A page of Chromium that shows the film.
 
+    It is spoken to in a thread of its own: Playwright wants one in which no event loop runs.
+
     Attributes:
         plan: What the viewer says of the film, see ``FilmPlan`` in diagnostics.ts.
     """
 
     plan: dict[str, Any]
-    _page: Page
-    _protocol: CDPSession
+    _shown: _Shown
+    _thread: ThreadPoolExecutor
 
     def picture(self, second: float) -> Image.Image:
         """The picture of one second of the film, RGB.
@@ -64,6 +67,18 @@ class Camera:
         Raises:
             StageError: The viewer could not draw it whole.
         """
+        return self._thread.submit(self._shown.picture, second).result()
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """The page, in its thread."""
+
+    plan: dict[str, Any]
+    _page: Page
+    _protocol: CDPSession
+
+    def picture(self, second: float) -> Image.Image:
         with _told():
             mark = self._page.evaluate("second => window.tourgen.film.frame(second)", second)
             for _ in range(_TRIES):
@@ -120,6 +135,17 @@ def open_camera(site: Path, settings: FilmSettings, **wishes: str) -> Iterator[C
         StageError: Chromium or the viewer failed.
     """
     program = require_camera()
+    with ThreadPoolExecutor(1) as thread, ExitStack() as closing:
+        opened = _opened(program, site, settings, wishes)
+        shown = thread.submit(opened.__enter__).result()
+        closing.push(lambda *fault: thread.submit(opened.__exit__, *fault).result())
+        yield Camera(shown.plan, shown, thread)
+
+
+@contextmanager
+def _opened(
+    program: Path, site: Path, settings: FilmSettings, wishes: Mapping[str, str]
+) -> Iterator[_Shown]:
     from playwright.sync_api import sync_playwright
 
     asked = {"film": "", "lang": settings.language, **wishes}
@@ -148,7 +174,7 @@ def _flags() -> list[str]:
     return [*FLAGS, "--no-sandbox"] if root else list(FLAGS)
 
 
-def _aimed(page: Page, address: str) -> Camera:
+def _aimed(page: Page, address: str) -> _Shown:
     page.goto(address)
     end = time.monotonic() + _OPENS_S
     # The published headers forbid playwright's own wait, which evaluates strings.
@@ -164,7 +190,7 @@ def _aimed(page: Page, address: str) -> Camera:
             )
         page.wait_for_timeout(_LOOKS_EVERY_S * 1000)
     plan = page.evaluate("window.tourgen.film.plan()")
-    return Camera(plan, page, page.context.new_cdp_session(page))
+    return _Shown(plan, page, page.context.new_cdp_session(page))
 
 
 @contextmanager

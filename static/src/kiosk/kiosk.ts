@@ -25,6 +25,8 @@ const TICK_MS = 250;
 /** What fails to come is asked for again, and a picture that stays lost is given up, after so long. */
 const PATIENCE_S = 6;
 const NEWS_S = 60;
+/** Who is led or listens for so long without a touch has left. */
+const LED_S = 1200;
 /** So many touches in the upper left corner, none of them later than that, open the service. */
 const CORNER_TOUCHES = 5;
 const CORNER_PX = 96;
@@ -49,6 +51,8 @@ export class Kiosk {
   #failedSince: number | null = null;
   #askedNews = performance.now();
   #isReloading = false;
+  /** When somebody touched anything last. */
+  #seen = performance.now();
 
   constructor(host: HTMLElement, files: Files, tour: Tour, settings: KioskSettings, visit: Visit) {
     this.#host = host;
@@ -133,6 +137,7 @@ export class Kiosk {
     // A touch of the warning is for it alone: it goes once that has ended, or would reach the room.
     if (this.#state === "warning" && byPointer) return;
     this.#idle.reset();
+    this.#seen = performance.now();
     if (this.#state === "warning") this.#goOn();
     if (this.#state === "asleep") this.#attract();
   }
@@ -142,7 +147,8 @@ export class Kiosk {
     const { idle_s, warning_s, hours } = this.#settings;
     const idle = this.#idle.seconds;
     this.#mend();
-    if (this.#visit.isBusy) this.#idle.reset();
+    const isLed = this.#visit.isBusy && performance.now() - this.#seen < LED_S * 1000;
+    if (isLed) this.#idle.reset();
     if (this.#state === "visit" && idle > idle_s) {
       this.#enter("warning");
       this.#warning.show(this.#front.words);
