@@ -22,7 +22,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     parser.addoption("--tour", type=Path, help="judge this built tour, not a miniature of the demo")
     parser.addoption(
-        "--acts", type=int, default=200, help="random acts at the kiosk (make soak: 10000)"
+        "--acts", type=int, default=100, help="random acts at the kiosk (make soak: 10000)"
     )
     parser.addoption(
         "--kiosk-visits", type=int, default=4, help="visits at the kiosk (make soak: 160)"
