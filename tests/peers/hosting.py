@@ -17,6 +17,7 @@ from http import HTTPStatus
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
+from typing import Any
 
 from tourgen.headers import IMMUTABLE, REVALIDATED
 
@@ -71,9 +72,9 @@ def hosted(folder: Path, headers: Mapping[str, str]) -> Iterator[Host]:
 class _Handler(SimpleHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
 
-    def __init__(self, *args: object, host: Host, headers: Mapping[str, str], directory: str):
+    def __init__(self, *args: Any, host: Host, headers: Mapping[str, str], directory: str):
         self._host, self._headers = host, headers
-        super().__init__(*args, directory=directory)  # type: ignore[arg-type]
+        super().__init__(*args, directory=directory)
 
     def handle(self) -> None:
         with suppress(ConnectionError):  # a browser that is closed hangs up

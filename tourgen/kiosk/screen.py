@@ -12,7 +12,7 @@ from typing import Final
 
 from PIL import ImageGrab
 
-SWITCHES: Final = (
+SWITCHES: tuple[str, ...] = (
     "--kiosk",
     "--no-first-run",
     "--no-default-browser-check",

@@ -49,15 +49,7 @@ def described(tour: Tour, built: Mapping[str, BuiltRoom]) -> Json:
             _room(room, built[room.id], places[room.id], levels[room.id], texts[room.id])
             for room in tour.rooms
         ],
-        "stops": [
-            {
-                "room": halt.room,
-                **_view(halt.view),
-                "text": dict(halt.told),
-                "seconds": halt.seconds,
-            }
-            for halt in stops
-        ],
+        "stops": [_stop(halt) for halt in stops],
     }
 
 

@@ -25,12 +25,6 @@ export function canTakeAlong(): boolean {
   return window.isSecureContext && "serviceWorker" in navigator;
 }
 
-/** Whether the tour is here already, whole. */
-export async function isAlong(site: URL): Promise<boolean> {
-  const registration = await navigator.serviceWorker.getRegistration(site);
-  return Boolean(registration?.active);
-}
-
 /**
  * Takes the tour along.
  *
