@@ -98,8 +98,8 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument(
         "--single-file",
         action="store_true",
-        help="besides, for a colleague without tourgen, one self-contained HTML file a room or "
-        "tour, opened by a double click (its one inline script allowed by hash)",
+        help="besides, one HTML file of the tour and one of each room, which hold all they show "
+        "and open by a double click",
     )
     serve.add_argument("--port", type=_positive, default=8000, help="port (8000)")
     kiosk.add_argument("--port", type=_positive, default=8710, help="port (8710)")
