@@ -29,7 +29,7 @@ from tourgen.report import tour_report
 from tourgen.site import BuiltRoom, Made, write_site
 from tourgen.threads import cores
 from tourgen.tour import Link, Tour, Viewpoint
-from tourgen.unchanged import forget_build, remember_build
+from tourgen.unchanged import forget_build, remember_build, seen_by_build
 from tourgen.workers import Workers, workers
 
 _STEP_INSIDE_M = 0.9
@@ -101,6 +101,9 @@ def build_tour(
         Faults: The single file of a room would be larger than browsers open.
     """
     started = time.perf_counter()
+    sent = is_remote(str(out))
+    here = tour.folder / _SENT if sent else Path(out)
+    seen = seen_by_build(tour.folder, here, sources(tour))
     cache = Cache(tour.folder)
     recipes = tour_recipes(tour, cache)
     _require_built(recipes, [tour.room(room_id).id for room_id in only], cache)
@@ -114,8 +117,6 @@ def build_tour(
     if len(rooms) < len(outcomes):
         raise RoomsFailed(tuple(each for each in outcomes if isinstance(each, TourgenError)))
     report = tour_report(rooms, time.perf_counter() - started)
-    sent = is_remote(str(out))
-    here = tour.folder / _SENT if sent else Path(out)
     published = _published(tour, {room.id: room for room in rooms})
     report = write_site(tour, published, report, here, single_files=single_files)
     if sent:
@@ -124,7 +125,7 @@ def build_tour(
     if sent or has_fetched(tour.folder):
         forget_build(tour.folder)
     else:
-        remember_build(tour.folder, here, sources(tour))
+        remember_build(tour.folder, here, seen)
     return report
 
 

@@ -20,6 +20,7 @@ from published import published_files
 from scan_files import cloud_table, write_ply
 
 from tourgen.cli import main
+from tourgen.site import write_site
 from tourgen.stages.surface import crust
 from tourgen.unchanged import last_report
 
@@ -190,6 +191,25 @@ def test_only_an_untouched_tour_is_told_at_once(
     assert last_report(box_copy, box_copy / "site") is None
     assert told(capsys, "build", str(box_copy))["ran_stages"] == 0
     assert published_files(box_copy / "site") == before
+
+
+def test_a_title_changed_while_a_build_runs_is_found_by_the_next(
+    box_copy: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = box_copy / "tour.toml"
+    edited = file.read_text("utf-8").replace('en = "', 'en = "New: ', 1)
+
+    def write_while_edited(*given: Any, **named: Any) -> Any:
+        file.write_text(edited, encoding="utf-8")
+        return write_site(*given, **named)
+
+    with monkeypatch.context() as patch:
+        patch.setattr("tourgen.build.write_site", write_while_edited)
+        told(capsys, "build", str(box_copy))
+    assert last_report(box_copy, box_copy / "site") is None
+    assert "New: " not in (box_copy / "site/index.html").read_text("utf-8")
+    told(capsys, "build", str(box_copy))
+    assert "New: " in (box_copy / "site/index.html").read_text("utf-8")
 
 
 def test_what_is_asked_of_an_untouched_tour_is_still_done(

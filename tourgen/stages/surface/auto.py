@@ -39,7 +39,7 @@ from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.stages.surface.winding import Winding
 from tourgen.voxels import voxel_groups
 
-VERSION = 16
+VERSION = 17
 _VOID_DEG = 0.75
 """Where six beams do not lie nearer in direction, nothing is known of what they went through."""
 _MOST_BEAMS = 10_000_000

@@ -28,9 +28,12 @@ _BARE = 0.4
 _DEEPEST = np.float32(3)
 """Cells off the surface up to which a distance is told where another surface is cut back: told
 farther, it would jump from deep behind that to in front of the cut, and leave it open."""
-_MARGIN = 0.2
-"""How far the grid goes on around the points, in their extent: a surface that closes gaps may. Of
-a scene that is open itself, a wall alone, it would go on without end."""
+_FARTHEST = 0.2
+"""How far from every point a surface may go on to close a gap, in the extent of the room. Of a
+scene that is open itself, a wall alone, and of what is seen through a window, it would go on
+without end."""
+_STRAY_PERCENT = 1.0
+"""Of the points on either side, that may lie far outside the room."""
 
 
 class Field:
@@ -67,9 +70,11 @@ class Field:
         )
         self.cell_m = np.float32(cell_m)
         low, high = extent(planes.points)
+        within = np.percentile(planes.points, [_STRAY_PERCENT, 100 - _STRAY_PERCENT], axis=0)
+        widest_m = self._reach_m.max()
+        self._most_m = widest_m + np.float32(_FARTHEST * np.ptp(within, axis=0).max())
         extent_m = np.float32((high - low).max())
-        margin_m = self._reach_m.max() + 2 * self.cell_m + np.float32(_MARGIN) * extent_m
-        self.low, self._high = low - margin_m, high + margin_m
+        self.low = low - (widest_m + 2 * self.cell_m + np.float32(_FARTHEST) * extent_m)
         self.seeds = self.cells(planes.points)
 
     def places(self, key: Keys) -> Float32:
@@ -88,8 +93,7 @@ class Field:
         return self._carved(places, distance, far)
 
     def carried_on(self, key: Keys, beyond: Beyond) -> Float32:
-        """The same, fading into the distance to another surface where it becomes unknown; NaN
-        beyond the grid."""
+        """The same, fading into the distance to another surface where it becomes unknown."""
         places = self.places(key)
         distance, far, _ = self._at(places, False)
         trust = np.clip((1 - far) / np.float32(_FADE), 0, 1)
@@ -97,15 +101,18 @@ class Field:
         most_m = _DEEPEST * self.cell_m
         theirs = np.clip(beyond.distance(places[rest]), -most_m, most_m)
         distance[rest] = trust[rest] * distance[rest] + (1 - trust[rest]) * theirs
-        distance[((places < self.low) | (places > self._high)).any(axis=1)] = np.nan
         return self._carved(places, distance, far)
 
     def _carved(self, places: Float32, distance: Float32, far: Float32) -> Float32:
-        """(n,) distances, positive too where beams went on through what the planes only claim."""
+        """(n,) distances, positive too where beams went on through what the planes only claim,
+        and unknown behind what no point is near to: there it ends."""
+        at = np.flatnonzero((far > _BARE) & (distance <= 0))
+        nearest, _ = self._nearest.nearest(places[at], 1, float(self._most_m))
+        bare = nearest[:, 0] < 0
+        distance[at[bare]] = np.nan
         if self._free is None:
             return distance
-        at = np.flatnonzero((far > _BARE) & (distance <= 0))
-        nearest, _ = self._nearest.nearest(places[at], 1)
+        at, nearest = at[~bare], nearest[~bare]
         depth = self._free.depth_m(places[at], self._planes.normals[nearest[:, 0]])
         distance[at] = np.maximum(distance[at], np.minimum(depth, _DEEPEST * self.cell_m))
         return distance
