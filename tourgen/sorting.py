@@ -1,9 +1,12 @@
 """Sorting by whole numbers: a radix sort, which numpy has for 16 bits alone.
 
-The cells of 15 million points: 0.6 instead of 1.7 s.
+The cells of 15 million points: 0.6 instead of 1.7 s. And each once: `numpy.unique` keeps them in a
+hash table, which takes 17 times as long as sorting a million (numpy 2.4).
 """
 
 from __future__ import annotations
+
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +14,7 @@ import numpy.typing as npt
 from tourgen.compiled import compiled
 
 Keys = npt.NDArray[np.int64]
+Whole = TypeVar("Whole", bound=np.integer[Any])
 
 _BITS = 13
 """Of a key at a time: so many counters stay in the processor's cache."""
@@ -24,6 +28,13 @@ def order_of(keys: Keys) -> Keys:
         for shift in range(0, bits, _BITS):
             order = _pass(keys, order, shift)
     return order
+
+
+def distinct(keys: npt.NDArray[Whole]) -> npt.NDArray[Whole]:
+    """The keys sorted, each once."""
+    ordered = np.sort(keys, axis=None)
+    first = np.concatenate([[True], ordered[1:] != ordered[:-1]])[: len(ordered)]
+    return np.asarray(ordered[first], keys.dtype)
 
 
 @compiled

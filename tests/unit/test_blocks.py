@@ -10,9 +10,10 @@ from sampled import faces_per_edge, sphere
 from test_auto import SETTINGS, without
 
 from tourgen.geometry import Float32, Mesh
+from tourgen.sorting import distinct
 from tourgen.stages.surface import auto
 from tourgen.stages.surface.blocks import drawn_by_blocks
-from tourgen.stages.surface.growing import distinct, grown
+from tourgen.stages.surface.growing import grown
 from tourgen.stages.surface.marching_cubes import Keys, corner_of, key_of, marching_cubes
 
 CELL_M = 0.05

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tourgen.geometry import Float32
-from tourgen.stages.surface.growing import distinct, grown
+from tourgen.sorting import distinct
+from tourgen.stages.surface.growing import grown
 from tourgen.stages.surface.marching_cubes import CELL_CORNERS, Keys, corner_of, key_of
 
 CELL_M = 0.1

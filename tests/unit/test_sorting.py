@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tourgen.sorting import order_of
+from tourgen.sorting import distinct, order_of
 from tourgen.voxels import voxel_groups
 
 
@@ -16,6 +16,13 @@ from tourgen.voxels import voxel_groups
 def test_the_order_is_numpys(keys: list[int]) -> None:
     array = np.array(keys, np.int64)
     np.testing.assert_array_equal(order_of(array), np.argsort(array, kind="stable"))
+
+
+@settings(deadline=None)
+@given(st.lists(st.integers(-9, 9) | st.integers(0, 2**62), max_size=300))
+def test_each_is_kept_once_as_numpy_does(keys: list[int]) -> None:
+    array = np.array(keys, np.int64)
+    np.testing.assert_array_equal(distinct(array), np.unique(array))
 
 
 @pytest.mark.parametrize("voxel_m", [0.01, 0.1, 50.0])

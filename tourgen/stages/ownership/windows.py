@@ -9,6 +9,7 @@ import numpy.typing as npt
 from scipy.optimize import minimize
 
 from tourgen.geometry import Float32, Float64
+from tourgen.sorting import distinct
 from tourgen.stages.ownership.settings import Settings
 
 TURN = 2j * np.pi
@@ -103,7 +104,7 @@ def drawn(count: int, wanted: int, rng: np.random.Generator) -> npt.NDArray[np.i
     """
     if wanted > count / _SEVERAL:
         return rng.permutation(count)[:wanted]
-    return np.unique(rng.integers(0, count, wanted))
+    return distinct(rng.integers(0, count, wanted))
 
 
 def _cells(elevation: Float64, azimuth: Float64) -> npt.NDArray[np.int64]:

@@ -12,8 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.geometry import Float32
+from tourgen.sorting import distinct
 
-_NEIGHBOURS = np.array(list(product((-1, 0, 1), repeat=3)))
+_AXES = np.array([1 << 42, 1 << 21, 1])
+_NEIGHBOURS: npt.NDArray[np.int64] = np.array(list(product((-1, 0, 1), repeat=3))) @ _AXES
 _MOST_CELLS = 2**20
 """Along an axis; so that three numbers of cells fit into one of 64 bits."""
 
@@ -25,8 +27,8 @@ def nearby(points: Float32, places: Float32, reach_m: float) -> npt.NDArray[np.b
     extent_m = float((places.max(axis=0) - low).max()) + 2 * reach_m
     edge_m = np.float32(max(reach_m, extent_m / _MOST_CELLS))
     inside = np.flatnonzero(((points > low) & (points < low + extent_m)).all(axis=1))
-    taken = np.unique(_cells(places, low, edge_m), axis=0)
-    wanted = np.unique(_key((taken[:, None] + _NEIGHBOURS).reshape(-1, 3)))
+    taken = distinct(_key(_cells(places, low, edge_m)))
+    wanted = distinct(taken[:, None] + _NEIGHBOURS)
     key = _key(_cells(points[inside], low, edge_m))
     found = np.zeros(len(points), np.bool_)
     at = np.minimum(np.searchsorted(wanted, key), len(wanted) - 1)
@@ -39,5 +41,4 @@ def _cells(points: Float32, low: Float32, edge_m: np.float32) -> npt.NDArray[np.
 
 
 def _key(cell: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    x, y, z = (cell + 1).T
-    return np.asarray((x << 42) | (y << 21) | z)
+    return np.asarray((cell + 1) @ _AXES)

@@ -22,6 +22,7 @@ from scipy.signal import savgol_filter
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64
+from tourgen.sorting import distinct
 from tourgen.stages.surface.tubes import ON, RADII_M, WIDTH_TRUST, Rod, behind, fits
 
 _PIECE_M = 0.5
@@ -162,7 +163,7 @@ def traced(rod: Rod, points: Float32, noise_m: float, spacing_m: float) -> tuple
 def _about(rod: Rod, tree: cKDTree, reach_m: float) -> Ints:
     """The points within reach of a rod's axis, and some more."""
     near = tree.query_ball_point(rod.axis, reach_m + _STEP_M)
-    return np.unique(np.concatenate(near).astype(np.int64))
+    return distinct(np.concatenate(near).astype(np.int64))
 
 
 def _carried_on(rod: Rod, tree: cKDTree, noise_m: float, spacing_m: float) -> Rod:

@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tourgen.geometry import Float32, Mesh
+from tourgen.sorting import distinct
 from tourgen.stages.mesh_arrays import weld
 from tourgen.stages.simplify import simplified
-from tourgen.stages.surface.growing import distinct, grown, union, without
+from tourgen.stages.surface.growing import grown, union, without
 from tourgen.stages.surface.marching_cubes import AXIS_BITS, Keys
 
 EDGE_BITS = 9

@@ -10,8 +10,8 @@ from tourgen.compiled import compiled
 from tourgen.extent import extent
 from tourgen.geometry import Float32, Int32
 from tourgen.neighbours import Grid, Neighbours, nearest_to
+from tourgen.sorting import distinct
 from tourgen.stages.free_space import FreeSpace
-from tourgen.stages.surface.growing import distinct
 from tourgen.stages.surface.marching_cubes import Keys, corner_of, key_of
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.threads import in_parts

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from tourgen.compiled import compiled
 from tourgen.geometry import Float32
+from tourgen.sorting import distinct
 from tourgen.stages.surface.marching_cubes import CELL_CORNERS, STEPS, Keys
 
 _WORTH = 0.125
@@ -103,13 +104,6 @@ class _Told:
         the side, the others are the axis."""
         told = self.key, self.value, self._late_key, self._late_value
         return _crossed(cells, *told, most_m)
-
-
-def distinct(keys: Keys) -> Keys:
-    """The keys sorted, each once."""
-    ordered = np.sort(keys, axis=None)
-    first = np.concatenate([[True], ordered[1:] != ordered[:-1]])[: len(ordered)]
-    return np.asarray(ordered[first], np.int64)
 
 
 def _corners(cells: Keys) -> Keys:

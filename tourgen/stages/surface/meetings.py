@@ -22,7 +22,7 @@ from scipy.ndimage import binary_closing
 from tourgen.compiled import compiled
 from tourgen.geometry import Float32, Float64, Int32
 from tourgen.neighbours import Neighbours
-from tourgen.sorting import order_of
+from tourgen.sorting import distinct, order_of
 from tourgen.stages.cells import cells_of
 from tourgen.stages.surface.flats import Flats
 from tourgen.stages.surface.tangent_planes import TangentPlanes
@@ -99,8 +99,8 @@ def _pairs(points: Float32, flats: Flats, spacing_m: float) -> Iterator[tuple[in
     order = order_of(pair)
     for chosen in np.split(order, np.flatnonzero(np.diff(pair[order])) + 1):
         if len(chosen):
-            around = near[np.unique(one[chosen])]
-            groups = np.unique(around[around >= 0]).astype(np.int64)
+            around = near[distinct(one[chosen])]
+            groups = distinct(around[around >= 0]).astype(np.int64)
             first, second = divmod(int(pair[chosen[0]]), none)
             yield first, second, cells.members(groups)
 
