@@ -47,7 +47,7 @@ from tourgen.threads import each, in_parts
 
 __all__ = ["VERSION", "Ownership", "Settings", "ownership"]
 
-VERSION = 9
+VERSION = 10
 Ints = npt.NDArray[np.int64]
 _BLOCK = 200_000
 _ABOUT_M = 0.03

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
 
+from tourgen.compiled import compiled
 from tourgen.geometry import Float32, Float64
 from tourgen.sorting import distinct
 from tourgen.stages.ownership.settings import Settings
@@ -23,6 +24,7 @@ _SEVERAL = 10
 _LEAST_STEPS = 4
 """Of a grid in a window: less is its own width."""
 
+Mask = npt.NDArray[np.bool_]
 Complex = npt.NDArray[np.complex128]
 
 
@@ -153,12 +155,23 @@ def _about(
     found = []
     for first in range(0, len(points), _BLOCK):
         block = points[first : first + _BLOCK]
-        up, turn, _ = angles(block, place)
-        kept = looked_at.ravel()[_cells(up, turn)]
+        kept = np.flatnonzero(_looked_at(block, place, looked_at))
         if share < 1:
-            kept &= rng.random(len(block)) < share
+            kept = kept[rng.random(len(kept)) < share]
         found.append(block[kept])
     return np.concatenate(found)
+
+
+@compiled
+def _looked_at(points: Float32, place: Float64, cells: npt.NDArray[np.bool_]) -> Mask:
+    """(n,) whether the cell of a degree that each of (n, 3) points lies in is looked at."""
+    found = np.empty(len(points), np.bool_)
+    for i in range(len(points)):
+        x, y, z = points[i, 0] - place[0], points[i, 1] - place[1], points[i, 2] - place[2]
+        row = int(np.degrees(np.arctan2(z, np.hypot(x, y))) + 90)
+        column = int(np.degrees(np.arctan2(y, x)) + 180)
+        found[i] = cells[row, column]
+    return found
 
 
 def rough(
