@@ -35,6 +35,7 @@ from tourgen.stages.ownership.grid import Grid, fitted, polished
 from tourgen.stages.ownership.settings import Settings
 from tourgen.stages.ownership.windows import (
     HIGHEST_DEG,
+    Lookout,
     Windows,
     agreeing,
     angles,
@@ -133,9 +134,10 @@ def _grid(
 ) -> Grid | None:
     """The grid of the station near a place, or None."""
     tries: list[tuple[float, int, Windows, Float64, float]] = []
+    lookout = Lookout(points, place, rng)
     windows_deg = settings.windows_deg
     for number, window_deg in enumerate(windows_deg):
-        windows = windows_about(points, place, window_deg, settings, rng)
+        windows = windows_about(lookout, place, window_deg, settings, rng)
         if windows is not None:
             there, frequency, answer = rough(windows, place, window_deg, settings)
             tries.append((answer, number, windows, there, frequency))
@@ -149,7 +151,7 @@ def _grid(
     best, most = None, settings.least_share
     clear = answer >= settings.clear_answer and windows_deg[number] == windows_deg[-1]
     for _ in range(_TRIES if clear else 1):
-        grid, share = _refined(points, windows, number, place, frequency, settings, rng)
+        grid, share = _refined(points, lookout, windows, number, place, frequency, settings, rng)
         if grid and share >= most:
             best, most = grid, share
         if most >= _CLEAR_SHARE:
@@ -159,6 +161,7 @@ def _grid(
 
 def _refined(
     points: Float32,
+    lookout: Lookout,
     windows: Windows,
     number: int,
     place: Float64,
@@ -172,7 +175,7 @@ def _refined(
     for window_deg in settings.windows_deg[number::-1]:
         about_m = _ABOUT_M * narrowest_deg / window_deg
         place, frequency = climbed(windows, place, frequency, window_deg, about_m)
-        wider = windows_about(points, place, window_deg, settings, rng)
+        wider = windows_about(lookout, place, window_deg, settings, rng)
         if wider is None:
             return None, 0.0
         windows = wider

@@ -20,6 +20,8 @@ _SAMPLE = 600_000
 _LARGEST_SAMPLE = 6_000_000
 _BLOCK = 1 << 20
 _ROWS, _COLUMNS = 181, 361
+_BLOCK_DEG = 3
+"""Of directions that are looked at, or not, as one: wider than the windows that want so many."""
 _SEVERAL = 10
 _LEAST_STEPS = 4
 """Of a grid in a window: less is its own width."""
@@ -62,31 +64,68 @@ def angles(points: Float32 | Float64, place: Float64) -> tuple[Float64, Float64,
     )
 
 
+class Lookout:
+    """A cloud as it is seen from about a place, to draw points from."""
+
+    def __init__(self, points: Float32, place: Float64, rng: np.random.Generator) -> None:
+        self._points, self._place, self._rng = points, place, rng
+        self._patches: dict[int, Float32] = {}
+
+    def sample(self, wanted: int) -> Float32:
+        """So many points of all directions; of more than can be held at once only those of some
+        directions, the same each time."""
+        count = min(wanted, len(self._points))
+        if count <= _LARGEST_SAMPLE:
+            return self._points[drawn(len(self._points), wanted, self._rng)]
+        if wanted not in self._patches:
+            self._patches[wanted] = self._patch(_LARGEST_SAMPLE / count, count / len(self._points))
+        return self._patches[wanted]
+
+    def _patch(self, directions: float, share: float) -> Float32:
+        """A share of the points of a share of all directions."""
+        shape = -(-_ROWS // _BLOCK_DEG), -(-_COLUMNS // _BLOCK_DEG)
+        looked_at = self._rng.random(shape) < directions
+        looked_at = looked_at.repeat(_BLOCK_DEG, axis=0).repeat(_BLOCK_DEG, axis=1)
+        found = []
+        for first in range(0, len(self._points), _BLOCK):
+            block = self._points[first : first + _BLOCK]
+            kept = np.flatnonzero(_looked_at(block, self._place, looked_at))
+            if share < 1:
+                kept = kept[self._rng.random(len(kept)) < share]
+            found.append(block[kept])
+        return np.concatenate(found)
+
+
+@compiled
+def _looked_at(points: Float32, place: Float64, cells: Mask) -> Mask:
+    """(n,) whether the cell of a degree that each of (n, 3) points lies in is looked at."""
+    found = np.empty(len(points), np.bool_)
+    for i in range(len(points)):
+        x, y, z = points[i, 0] - place[0], points[i, 1] - place[1], points[i, 2] - place[2]
+        row = int(np.degrees(np.arctan2(z, np.hypot(x, y))) + 90)
+        column = int(np.degrees(np.arctan2(y, x)) + 180)
+        found[i] = cells[row, column]
+    return found
+
+
 def windows_about(
-    points: Float32,
+    lookout: Lookout,
     place: Float64,
     window_deg: float,
     settings: Settings,
     rng: np.random.Generator,
 ) -> Windows | None:
     """Windows of points that can be seen from a place; None where there are too few."""
-    wanted = int(_SAMPLE * (settings.windows_deg[0] / window_deg) ** 2)
-    sample = points[drawn(len(points), min(wanted, _LARGEST_SAMPLE), rng)]
-    nearest_m = _nearest_m(sample, place)
-    sample, elevation, azimuth, reach = _in_front(sample, place, nearest_m)
+    sample = lookout.sample(int(_SAMPLE * (settings.windows_deg[0] / window_deg) ** 2))
+    sample, elevation, azimuth, reach = _in_front(sample, place)
     half = window_deg / 2
-    seeds = rng.permutation(len(sample))[: 4 * settings.windows]
-    middles = list(zip(elevation[seeds], azimuth[seeds], reach[seeds], strict=True))
-    if min(wanted, len(points)) > _LARGEST_SAMPLE:
-        share = min(wanted / len(points), 1.0)
-        sample = _about(points, place, elevation[seeds], azimuth[seeds], window_deg, share, rng)
-        sample, elevation, azimuth, reach = _in_front(sample, place, nearest_m)
     chosen: list[npt.NDArray[np.int64]] = []
-    for up, turn, away in middles:
+    for seed in rng.permutation(len(sample))[: 4 * settings.windows]:
+        up = elevation[seed]
         low, high = np.searchsorted(elevation, up + np.array([-half, half]))
-        aside = (azimuth[low:high] - turn + 180) % 360 - 180
+        aside = (azimuth[low:high] - azimuth[seed] + 180) % 360 - 180
         alike = np.abs(aside) * np.cos(np.radians(up)) < half
-        alike &= np.abs(reach[low:high] / away - 1) < 0.1
+        alike &= np.abs(reach[low:high] / reach[seed] - 1) < 0.1
         window = low + np.flatnonzero(alike)
         if len(window) >= settings.window_points // 3:
             chosen.append(rng.permutation(window)[: settings.window_points])
@@ -115,63 +154,16 @@ def _cells(elevation: Float64, azimuth: Float64) -> npt.NDArray[np.int64]:
     return np.asarray(rows * _COLUMNS + np.floor(azimuth + 180).astype(np.int64))
 
 
-def _nearest_m(points: Float32, place: Float64) -> Float64:
-    """Range of the nearest point in each cell of a degree."""
-    elevation, azimuth, reach = angles(points, place)
-    nearest = np.full(_ROWS * _COLUMNS, np.inf)
-    np.minimum.at(nearest, _cells(elevation, azimuth), reach)
-    return nearest
-
-
-def _in_front(
-    points: Float32, place: Float64, nearest_m: Float64
-) -> tuple[Float32, Float64, Float64, Float64]:
+def _in_front(points: Float32, place: Float64) -> tuple[Float32, Float64, Float64, Float64]:
     """The points that no other hides, by elevation, with their angles and range."""
     elevation, azimuth, reach = angles(points, place)
-    near = reach < 1.08 * nearest_m[_cells(elevation, azimuth)] + 0.03
+    cell = _cells(elevation, azimuth)
+    nearest_m = np.full(_ROWS * _COLUMNS, np.inf)
+    np.minimum.at(nearest_m, cell, reach)
+    near = reach < 1.08 * nearest_m[cell] + 0.03
     near &= (reach > 0.4) & (np.abs(elevation) < HIGHEST_DEG)
     order = np.flatnonzero(near)[np.argsort(elevation[near])]
     return points[order], elevation[order], azimuth[order], reach[order]
-
-
-def _about(
-    points: Float32,
-    place: Float64,
-    elevation: Float64,
-    azimuth: Float64,
-    window_deg: float,
-    share: float,
-    rng: np.random.Generator,
-) -> Float32:
-    """A share of the points that lie in some windows, and of some beside: narrow windows hold
-    enough points only of so many that they cannot be held at once."""
-    looked_at = np.zeros((_ROWS, _COLUMNS), np.bool_)
-    half = window_deg / 2
-    wide = half / np.cos(np.radians(np.clip(elevation, -HIGHEST_DEG, HIGHEST_DEG)))
-    for up in np.linspace(-half, half, int(np.ceil(window_deg)) + 1):
-        for turn in np.linspace(-1, 1, int(np.ceil(2 * wide.max())) + 1):
-            around = (azimuth + turn * wide + 180) % 360 - 180
-            looked_at.ravel()[_cells(np.clip(elevation + up, -90, 90), around)] = True
-    found = []
-    for first in range(0, len(points), _BLOCK):
-        block = points[first : first + _BLOCK]
-        kept = np.flatnonzero(_looked_at(block, place, looked_at))
-        if share < 1:
-            kept = kept[rng.random(len(kept)) < share]
-        found.append(block[kept])
-    return np.concatenate(found)
-
-
-@compiled
-def _looked_at(points: Float32, place: Float64, cells: npt.NDArray[np.bool_]) -> Mask:
-    """(n,) whether the cell of a degree that each of (n, 3) points lies in is looked at."""
-    found = np.empty(len(points), np.bool_)
-    for i in range(len(points)):
-        x, y, z = points[i, 0] - place[0], points[i, 1] - place[1], points[i, 2] - place[2]
-        row = int(np.degrees(np.arctan2(z, np.hypot(x, y))) + 90)
-        column = int(np.degrees(np.arctan2(y, x)) + 180)
-        found[i] = cells[row, column]
-    return found
 
 
 def rough(
