@@ -154,9 +154,15 @@ def test_mixed_pixels_go_and_edges_stay() -> None:
     assert sifted.removed["mixed"] > 30
 
 
-@pytest.mark.parametrize("glass", ["mirror", "window"])
-def test_a_mirrored_room_goes_and_one_behind_a_window_stays(glass: str) -> None:
-    rng, way = np.random.default_rng(2), beams(0.8)
+@pytest.mark.parametrize(
+    ("glass", "step_deg", "early"),
+    [("mirror", 0.8, 0.0), ("window", 0.8, 0.0), ("mirror", 0.3, 0.1)],
+    ids=["mirror", "window", "mirror, dense, with strays before what it shows"],
+)
+def test_a_mirrored_room_goes_and_one_behind_a_window_stays(
+    glass: str, step_deg: float, early: float
+) -> None:
+    rng, way = np.random.default_rng(2), beams(step_deg)
     low, high = ROOM
     chest, shelf = (
         solid([-1.0, -0.2, 0.0], [-0.2, 0.3, 0.9]),
@@ -180,7 +186,7 @@ def test_a_mirrored_room_goes_and_one_behind_a_window_stays(glass: str) -> None:
             more = cast_each(
                 start, further, [low[0] - 1, high[1] - 1e-3, -1], high + np.array([1, 3, 1])
             )
-        reach[through] += more
+        reach[through] += more * np.where(rng.random(len(more)) < early, rng.random(len(more)), 1)
         parts.append((eye + way * noisy(reach, rng)[..., None]).reshape(-1, 3))
         behind.append(through.reshape(-1))
     cloud, seen_behind = cloud_of(parts), np.concatenate(behind)

@@ -40,7 +40,7 @@ from tourgen.stages.sift.strays import clusters, islands, isolated
 from tourgen.stages.sift.through import passed
 from tourgen.stages.sift.views import View, views
 
-VERSION = 6
+VERSION = 7
 Mask = npt.NDArray[np.bool_]
 
 
@@ -58,6 +58,9 @@ class Settings:
             theirs by this factor.
         island_gap_m: Clusters farther apart than this are separate.
         island_share: A cluster with less than this share of the points is an island.
+        bridge_share: Strays before a mirror join what is behind it to the room in so dense a scan
+            that they lie everywhere; places with less than this share of the points that there
+            mostly are join nothing.
     """
 
     min_points: int = 10_000
@@ -68,6 +71,7 @@ class Settings:
     isolation_ratio: float = 2.5
     island_gap_m: float = 0.15
     island_share: float = 0.002
+    bridge_share: float = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +131,7 @@ def _without_reflections(
 ) -> tuple[PointCloud, int]:
     if not len(stations):
         return cloud, 0
-    cluster = clusters(cloud.points, settings.island_gap_m)
+    cluster = clusters(cloud.points, settings.island_gap_m, settings.bridge_share)
     seen = list(views(cloud, stations))
     found = reflections(cloud.points, cluster, seen, settings.behind_m)
     points = cloud.points.copy()

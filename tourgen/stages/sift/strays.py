@@ -55,15 +55,29 @@ def _around(cloud: Neighbours, places: Float32, count: int) -> tuple[Float32, In
     return away_m[:, 1:].mean(axis=1), near[:, 1:]  # the first is the point itself
 
 
-def clusters(points: Float32, gap_m: float) -> Int32:
-    """(n,) number of the cluster that each point lies in, ``gap_m`` apart, the largest first."""
+def clusters(points: Float32, gap_m: float, least_share: float = 0.0) -> Int32:
+    """(n,) number of the cluster that each point lies in, ``gap_m`` apart, the largest first.
+
+    Cells of that edge with less than ``least_share`` of the points that there are about most
+    points join nothing: they follow the nearest that holds more.
+    """
     cells, inverse, counts = _occupied(points, gap_m)
-    pairs = cKDTree(cells).query_pairs(1.8, output_type="ndarray")
-    cluster = components(pairs, len(cells))
+    full = counts >= least_share * _about_most(counts)
+    pairs = cKDTree(cells[full]).query_pairs(1.8, output_type="ndarray")
+    cluster = np.empty(len(cells), np.int64)
+    cluster[full] = components(pairs, int(full.sum()))
+    if not full.all():
+        cluster[~full] = cluster[full][cKDTree(cells[full]).query(cells[~full])[1]]
     size = np.bincount(cluster, weights=counts)
     rank = np.empty(len(size), np.int32)
     rank[np.argsort(-size, kind="stable")] = np.arange(len(size))
     return np.asarray(rank[cluster][inverse])
+
+
+def _about_most(counts: npt.NDArray[np.int64]) -> int:
+    """Median over all points of how many their cell holds."""
+    ordered = np.sort(counts)
+    return int(ordered[np.searchsorted(np.cumsum(ordered), ordered.sum() / 2)])
 
 
 def islands(points: Float32, gap_m: float, share: float) -> Mask:
