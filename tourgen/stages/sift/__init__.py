@@ -40,7 +40,7 @@ from tourgen.stages.sift.strays import clusters, islands, isolated
 from tourgen.stages.sift.through import passed
 from tourgen.stages.sift.views import View, views
 
-VERSION = 7
+VERSION = 8
 Mask = npt.NDArray[np.bool_]
 
 

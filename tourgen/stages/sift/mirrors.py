@@ -97,7 +97,8 @@ def reflections(
 
     Args:
         points: (n, 3) metres.
-        cluster: (n,) number of the cluster apart that each point lies in, 0 for the room itself.
+        cluster: (n,) number of the cluster apart that each point lies in, 0 for the room itself,
+            -1 for strays.
         seen: The stations' views.
         behind_m: What lies less behind the glass is not told from it.
     """
@@ -128,7 +129,7 @@ def reflections(
         for each in seen:
             hidden = mirror.hides(each.station, points[each.index], behind_m)
             # Another station may have measured a wall there, where it is not told which did.
-            hidden &= each.told | (cluster[each.index] > 0)
+            hidden &= each.told | (cluster[each.index] != 0)
             fresh = each.index[hidden & each.told]
             fresh = fresh[~gone[fresh]]
             shown.append((fresh, mirror.crossing(each.station, points[fresh]).astype(np.float32)))

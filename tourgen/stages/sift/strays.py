@@ -59,25 +59,26 @@ def clusters(points: Float32, gap_m: float, least_share: float = 0.0) -> Int32:
     """(n,) number of the cluster that each point lies in, ``gap_m`` apart, the largest first.
 
     Cells of that edge with less than ``least_share`` of the points that there are about most
-    points join nothing: they follow the nearest that holds more.
+    points join nothing: what lies in them has the number -1.
     """
     cells, inverse, counts = _occupied(points, gap_m)
     full = counts >= least_share * _about_most(counts)
     pairs = cKDTree(cells[full]).query_pairs(1.8, output_type="ndarray")
-    cluster = np.empty(len(cells), np.int64)
-    cluster[full] = components(pairs, int(full.sum()))
-    if not full.all():
-        cluster[~full] = cluster[full][cKDTree(cells[full]).query(cells[~full])[1]]
-    size = np.bincount(cluster, weights=counts)
+    cluster = components(pairs, int(full.sum()))
+    size = np.bincount(cluster, weights=counts[full])
     rank = np.empty(len(size), np.int32)
     rank[np.argsort(-size, kind="stable")] = np.arange(len(size))
-    return np.asarray(rank[cluster][inverse])
+    number = np.full(len(cells), -1, np.int32)
+    number[full] = rank[cluster]
+    return np.asarray(number[inverse])
 
 
 def _about_most(counts: npt.NDArray[np.int64]) -> int:
-    """Median over all points of how many their cell holds."""
+    """Median over all points of how many their cell holds; 0 of none."""
     ordered = np.sort(counts)
-    return int(ordered[np.searchsorted(np.cumsum(ordered), ordered.sum() / 2)])
+    return (
+        int(ordered[np.searchsorted(np.cumsum(ordered), ordered.sum() / 2)]) if len(ordered) else 0
+    )
 
 
 def islands(points: Float32, gap_m: float, share: float) -> Mask:
