@@ -235,8 +235,9 @@ export class Frontend {
     root.lang = this.#language;
     root.dir = directionOf(this.#language);
     document.title = this.title;
-    const room = this.text(this.#room.title);
-    this.#header.say(words, this.#language, this.text(this.#tour.title), room);
+    const tour = this.text(this.#tour.title);
+    this.#host.setAttribute("aria-label", tour);
+    this.#header.say(words, this.#language, tour, this.text(this.#room.title));
     this.#dock.say(words);
     this.map.say(words);
     this.panel.setWords(words.close);
