@@ -5,7 +5,7 @@ import type { Addresses } from "./address.ts";
 import { readQuery } from "./diagnostics.ts";
 import type { Files } from "./files.ts";
 import { Frontend } from "./page/frontend.ts";
-import { chosenLanguage, chooseLanguageForGood } from "./past.ts";
+import { chooseLanguageForGood } from "./past.ts";
 import { Rooms } from "./rooms.ts";
 import { tileDecoder } from "./scene/room-tiles.ts";
 import { Stage, type Pace } from "./scene/stage.ts";
@@ -20,7 +20,6 @@ import { Walking } from "./visit/walking.ts";
 import { Ways } from "./visit/ways.ts";
 import { Gamepads } from "./walk/gamepad.ts";
 import { Keyboard, type Wish } from "./walk/keyboard.ts";
-import { chooseLanguage } from "./words.ts";
 
 /** A sign may hang so deep in what stands behind it. */
 const SIGN_SLACK_M = 0.5;
@@ -30,6 +29,8 @@ const AIM_PX = 130;
 /** How a visit is held: on a page of its own, or at a kiosk, where nothing outlasts it. */
 export interface Manner {
   readonly kiosk: boolean;
+  /** The one that is spoken at first; its words were brought. */
+  readonly language: string;
   /** Told of each room that opens. */
   opened(room: Room): void;
   /** Back to the start was chosen. */
@@ -65,10 +66,8 @@ export class Visit {
     this.#tour = tour;
     this.#manner = manner;
     const query = readQuery(location.search);
-    const asked = addresses.languageAt(new URL(location.href));
-    const wishes = [asked, chosenLanguage(), ...navigator.languages];
-    const language = manner.kiosk ? firstOf(tour) : chooseLanguage(tour.languages, wishes);
-    const front = new Frontend(host, files, addresses, tour, room, language, manner.kiosk, {
+    const { kiosk, language } = manner;
+    const front = new Frontend(host, files, addresses, tour, room, language, kiosk, {
       door: (link) => {
         this.#takeOver();
         this.#walking.walkThrough(link);
@@ -138,7 +137,7 @@ export class Visit {
       },
     });
     this.#ways = ways;
-    const isTraced = !manner.kiosk;
+    const isTraced = !kiosk;
     const journey = new Journey({ addresses, tour, front, rooms, walking, ways, isTraced });
     this.#journey = journey;
     this.#guidance = new Guidance({
@@ -167,7 +166,7 @@ export class Visit {
       stage,
       front,
       rooms,
-      kiosk: manner.kiosk,
+      kiosk,
       home: files.home,
       address: () => journey.address(),
       immerse: () => void immersion.begin(),
@@ -216,7 +215,7 @@ export class Visit {
     this.#tools.reset();
     this.front.panel.close();
     this.front.notice.clear();
-    this.front.speak(firstOf(this.#tour));
+    this.front.speak(this.#manner.language);
     this.#stage.widen();
   }
 
@@ -280,9 +279,4 @@ export class Visit {
     const address = this.#addresses.inLanguage(new URL(location.href), language);
     history.replaceState(history.state, "", address);
   }
-}
-
-/** The tour's first language. */
-function firstOf({ languages }: Tour): string {
-  return languages[0] ?? "en";
 }
