@@ -136,6 +136,8 @@ def test_the_small_map_turns_up_where_one_walks(visit: Visit) -> None:
     here.page.keyboard.up("ArrowLeft")
     here.settle()
     assert you.get_attribute("style") != before
+    marks = here.page.locator(".mini-map .you")
+    assert [mark.is_visible() for mark in marks.all()].count(True) == 1
     here.page.locator(".mini-map").click()
     here.wait("window.tourgen.see === 'plan'")
 
