@@ -92,7 +92,7 @@ export const GERMAN: Words = {
   takingAlong: "Der Rundgang ist unterwegs: {}",
   along: "Der Rundgang ist jetzt auf diesem Gerät und funktioniert ohne Netz.",
   notAlong: "Der Rundgang konnte nicht mitgenommen werden.",
-  kioskTouch: "Zum Beginnen berühren",
+  kioskTouch: "Zum Starten berühren",
   kioskStill: "Sind Sie noch da?",
   kioskReturns: "Der Rundgang kehrt in {} s zum Anfang zurück.",
   kioskStay: "Weiter",
