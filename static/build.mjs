@@ -27,6 +27,7 @@ const common = {
   bundle: true,
   minify: true,
   format: "esm",
+  charset: "utf8", // or every letter of an Arabic word would be six
   target: ["es2022"],
   define: { DRACO_FOLDER: JSON.stringify(draco) },
   legalComments: "none",

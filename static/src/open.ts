@@ -8,10 +8,11 @@ import type { Addresses } from "./address.ts";
 import { element, isTouch, pause } from "./dom.ts";
 import type { Files } from "./files.ts";
 import { kioskSettings } from "./kiosk/settings.ts";
+import { chosenLanguage } from "./past.ts";
 import { BINARY, WRAPPER } from "./scene/decoder.ts";
 import { askForRoom } from "./scene/prefetch.ts";
 import { fetchTour, roomCalled, startOf } from "./tour.ts";
-import { chooseLanguage, wordsIn } from "./words.ts";
+import { bringWords, chooseLanguage, SPOKEN, wordsIn } from "./words.ts";
 
 const PATIENCE_MS = 500;
 /** A phone that begins a room hears no finger for seconds: so long its page can be read before. */
@@ -35,10 +36,14 @@ export async function open(
   addresses: Addresses,
   plain?: () => void,
 ): Promise<void> {
-  const words = wordsIn(chooseLanguage(["en", "fr"], navigator.languages));
-  const give = (message: string, retry?: string): void => {
+  const asked = addresses.languageAt(new URL(location.href));
+  const wishes = [asked, chosenLanguage(), ...navigator.languages];
+  const own = chooseLanguage(SPOKEN, wishes);
+  const give = async (why: "noTour" | "noWebgl"): Promise<void> => {
     plain?.();
-    showPlain(host, message, retry);
+    await bringWords(own);
+    const words = wordsIn(own);
+    showPlain(host, words[why], why === "noTour" ? words.retry : undefined);
   };
   const films = new URLSearchParams(location.search).has("film");
   const kiosk = host.dataset["kiosk"];
@@ -46,31 +51,35 @@ export async function open(
   const touched = touch();
   if (!films) await Promise.race([touched, quiet(host)]);
   if (files.home) askAhead(host, files);
+  void bringWords(own); // most likely the tour's, too, which is not known yet
   let tour;
   try {
     tour = await fetchTour(files);
   } catch (error) {
     console.warn(error);
-    return give(words.noTour, words.retry);
+    return give("noTour");
   }
   if (films) {
-    const { Film } = await import("./film/film.ts");
-    new Film(host, files, tour);
+    const language = chooseLanguage(tour.languages, [asked]);
+    const [{ Film }] = await Promise.all([import("./film/film.ts"), bringWords(language)]);
+    new Film(host, files, tour, language);
     return;
   }
   const named = addresses.roomAt(new URL(location.href)) ?? host.dataset["room"] ?? null;
-  const asked = roomCalled(tour, named);
-  const room = asked ?? startOf(tour);
+  const found = roomCalled(tour, named);
+  const room = found ?? startOf(tour);
   if (files.home) void askForRoom(files, room);
+  const language = chooseLanguage(tour.languages, wishes);
+  const spoken = bringWords(language);
   if (isTouch() && kiosk === undefined) await Promise.race([touched, pause(READING_MS)]);
-  if (!canDraw()) return give(words.noWebgl);
+  if (!canDraw()) return give("noWebgl");
   if (kiosk !== undefined) {
     const { openKiosk } = await import("./kiosk/open.ts");
     return openKiosk(host, files, addresses, tour, room, kioskSettings(kiosk));
   }
-  const { Visit } = await import("./visit.ts");
-  const manner = { kiosk: false, opened: () => undefined, home: () => undefined };
-  new Visit(host, files, addresses, tour, room, manner).start(asked === null);
+  const [{ Visit }] = await Promise.all([import("./visit.ts"), spoken]);
+  const manner = { kiosk: false, language, opened: () => undefined, home: () => undefined };
+  new Visit(host, files, addresses, tour, room, manner).start(found === null);
   if (files.home) takeAlongInTime(files.home, tour);
 }
 

@@ -234,16 +234,15 @@ export class Tools {
     if (!home) return;
     front.panel.close();
     const share = new Intl.NumberFormat(mannerOf(front.language), { style: "percent" });
-    const close = [{ label: words.close, act: (): void => undefined }];
     const progress = (part: number): void =>
       front.notice.tell(words.takingAlong.replace("{}", share.format(part)), []);
     try {
       progress(0);
       await takeAlong(home, progress);
-      front.notice.tell(words.along, close);
+      front.notice.tellUntilClosed(words.along, words.close);
     } catch (error) {
       console.warn(error);
-      front.notice.tell(words.notAlong, close);
+      front.notice.tellUntilClosed(words.notAlong, words.close);
     }
   }
 

@@ -2,9 +2,25 @@
 
 import type { Texts } from "./tour.ts";
 import { ENGLISH, type Words } from "./words/en.ts";
-import { FRENCH } from "./words/fr.ts";
 
 export type { Words } from "./words/en.ts";
+
+/** Scripts of their own: a visitor waits for the words of one language, not of all. */
+const FETCHED: Readonly<Record<string, () => Promise<Words>>> = {
+  ar: async () => (await import("./words/ar.ts")).ARABIC,
+  br: async () => (await import("./words/br.ts")).BRETON,
+  de: async () => (await import("./words/de.ts")).GERMAN,
+  es: async () => (await import("./words/es.ts")).SPANISH,
+  fr: async () => (await import("./words/fr.ts")).FRENCH,
+  it: async () => (await import("./words/it.ts")).ITALIAN,
+  nl: async () => (await import("./words/nl.ts")).DUTCH,
+  pt: async () => (await import("./words/pt.ts")).PORTUGUESE,
+};
+
+/** The languages that the viewer speaks. English is always here, for when others do not come. */
+export const SPOKEN: readonly string[] = ["en", ...Object.keys(FETCHED)];
+
+const brought = new Map<string, Words>([["en", ENGLISH]]);
 
 const RIGHT_TO_LEFT = new Set(["ar", "dv", "fa", "he", "ps", "sd", "ug", "ur", "yi"]);
 
@@ -13,9 +29,24 @@ export function directionOf(language: string): "ltr" | "rtl" {
   return RIGHT_TO_LEFT.has(primary(language)) ? "rtl" : "ltr";
 }
 
-/** The viewer's words in `language`; English where it knows no better. */
+/** Brings the viewer's words in some languages; what does not come is said in English. */
+export async function bringWords(...languages: readonly string[]): Promise<void> {
+  await Promise.all(languages.map(primary).map(bring));
+}
+
+async function bring(language: string): Promise<void> {
+  if (brought.has(language)) return;
+  try {
+    const words = await FETCHED[language]?.();
+    if (words) brought.set(language, words);
+  } catch (error) {
+    console.warn(error);
+  }
+}
+
+/** The viewer's words in `language`, of those that were brought; else English. */
 export function wordsIn(language: string): Words {
-  return primary(language) === "fr" ? FRENCH : ENGLISH;
+  return brought.get(primary(language)) ?? ENGLISH;
 }
 
 /** The visitor's own manner of a language, "en-GB" of "en", for numbers and dates. */

@@ -85,6 +85,15 @@ def test_axe_finds_nothing_on_plain_pages(visit: Visit, page: str) -> None:
     assert not violations(here)
 
 
+@pytest.mark.parametrize("page", ["index.html", "rooms/stairs/index.html"])
+def test_axe_finds_nothing_while_the_poster_stands_alone(visit: Visit, page: str) -> None:
+    here = visit(size=SIZES["phone"])
+    here.page.route("**/viewer/*.js", lambda _: None)  # scripts are asked for, and never come
+    here.page.goto(f"{here.origin}/{page}", wait_until="commit")
+    here.page.locator("#tour > img").wait_for()
+    assert not violations(here)
+
+
 def test_targets_are_large_enough_for_a_finger(visit: Visit) -> None:
     here = visit(size=SIZES["phone"], has_touch=True)
     here.open("rooms/chamber1/index.html", levels="root")

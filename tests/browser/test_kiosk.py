@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Callable, Iterator
 from datetime import datetime
 from pathlib import Path
@@ -81,6 +82,25 @@ def test_it_attracts_in_every_language_and_goes_from_stop_to_stop(kiosk: Kiosk) 
     assert len(places) > 3
     for hidden in (".top", ".dock", ".mini-map"):
         assert not here.page.locator(hidden).is_visible()
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (1080, 1920)])
+def test_nine_languages_all_stand_on_the_screen(
+    site: Path, visit: Visit, size: tuple[int, int]
+) -> None:
+    told = json.loads((site / "tour.json").read_text("utf-8"))
+    told["languages"] = ["en", "fr", "de", "ar", "br", "es", "it", "nl", "pt"]
+    here = visit(size=size, reduced_motion="reduce")
+    here.page.route("**/tour.json", lambda route: route.fulfill(json=told))
+    here.page.goto(f"{here.origin}/kiosk.html?levels=root")
+    here.wait("window.tourgen?.ready")
+    boxes = [each.bounding_box() for each in here.page.locator(".begin").all()]
+    assert len(boxes) == len(told["languages"])
+    for box in boxes:
+        assert box is not None
+        assert box["y"] >= 0
+        assert box["y"] + box["height"] <= size[1]
+    assert "المس للبدء" in here.page.locator(".begin[lang=ar]").inner_text()
 
 
 def test_a_touch_begins_in_the_language_touched_and_nothing_of_it_stays(kiosk: Kiosk) -> None:

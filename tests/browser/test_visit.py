@@ -136,6 +136,8 @@ def test_the_small_map_turns_up_where_one_walks(visit: Visit) -> None:
     here.page.keyboard.up("ArrowLeft")
     here.settle()
     assert you.get_attribute("style") != before
+    marks = here.page.locator(".mini-map .you")
+    assert [mark.is_visible() for mark in marks.all()].count(True) == 1
     here.page.locator(".mini-map").click()
     here.wait("window.tourgen.see === 'plan'")
 
@@ -295,8 +297,9 @@ def test_languages_change_at_once_and_stay(visit: Visit) -> None:
     here = visit(size=SIZE, reduced_motion="reduce", locale="en")
     here.open("rooms/chamber1/index.html", levels="root")
     here.page.get_by_label("Language").select_option("fr")
+    here.wait("document.documentElement.lang === 'fr'")
     assert here.page.locator("h1").first.inner_text() == "Chambre de veille"
-    assert here.page.evaluate("document.documentElement.lang") == "fr"
+    assert here.page.get_by_label("Langue").input_value() == "fr"
     assert "lang=fr" in here.page.url
     here.page.goto(f"{here.origin}/rooms/chamber2/index.html")
     here.await_room("chamber2")
@@ -315,8 +318,12 @@ def test_a_language_from_right_to_left_turns_the_page(
     (tmp_path / "tour.json").write_text(json.dumps(tour), "utf-8")
     with served(tmp_path) as origin:
         here = visit(origin=origin, size=SIZE)
+        asked: list[str] = []
+        here.page.on("request", lambda request: asked.append(request.url.rpartition("/")[2]))
         here.open("rooms/chamber1/index.html", levels="root")
         assert here.page.evaluate("document.documentElement.dir") == "rtl"
+        assert here.page.get_by_role("button", name="الأدوات").is_visible()
+        assert [name[:2] for name in asked if re.match(r"[a-z]{2}-\w+\.js", name)] == ["ar"]
         tools, titles = (box_of(here.page.locator(f".top .{name}")) for name in ("tools", "titles"))
         assert tools["x"] < titles["x"]
 

@@ -400,7 +400,9 @@ class TourHead(_Table):
     languages: Languages = Field(
         default=("en",),
         min_length=1,
-        description="Codes of the languages that the texts are in; the first one is shown first.",
+        description="Codes of the languages that the texts are in; the first one is shown first. "
+        "Buttons and messages are there in ar, br, de, en, es, fr, it, nl and pt, and in English "
+        "beside texts in any other.",
     )
     start: RoomRef | None = Field(
         default=None, description="The room in which the tour starts. Left out: the first one."

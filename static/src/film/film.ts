@@ -12,7 +12,7 @@ import { readingS } from "../modes/stay.ts";
 import { tileDecoder } from "../scene/room-tiles.ts";
 import { Stage } from "../scene/stage.ts";
 import { roomCalled, type Room, type Tour } from "../tour.ts";
-import { chooseLanguage, directionOf, textIn, wordsIn } from "../words.ts";
+import { directionOf, textIn, wordsIn } from "../words.ts";
 import { cuesOf, type Cue } from "./cues.ts";
 import { Lettering } from "./lettering.ts";
 import { Scenery } from "./scenery.ts";
@@ -42,15 +42,16 @@ export class Film {
   readonly #mark = element("div", { class: "film-mark" });
   #drawn = 0;
 
-  constructor(host: HTMLElement, files: Files, tour: Tour) {
+  /** @param language Of titles and captions; its words were brought. */
+  constructor(host: HTMLElement, files: Files, tour: Tour, language: string) {
     const asked = new URLSearchParams(location.search);
     const { background, levels } = readQuery(location.search);
     this.#tour = tour;
     this.#captions = asked.has("captions");
-    this.#language = chooseLanguage(tour.languages, [asked.get("lang")]);
-    document.documentElement.lang = this.#language;
-    document.documentElement.dir = directionOf(this.#language);
-    this.#lettering = new Lettering(tour, files, this.#language, wordsIn(this.#language));
+    this.#language = language;
+    document.documentElement.lang = language;
+    document.documentElement.dir = directionOf(language);
+    this.#lettering = new Lettering(tour, files, language, wordsIn(language));
     const canvas = document.createElement("canvas");
     host.classList.add("film");
     host.replaceChildren(canvas, this.#lettering.element);

@@ -4,19 +4,23 @@ import type { Addresses } from "../address.ts";
 import type { Files } from "../files.ts";
 import type { Room, Tour } from "../tour.ts";
 import { Visit } from "../visit.ts";
+import { bringWords } from "../words.ts";
 import { Kiosk } from "./kiosk.ts";
 import type { KioskSettings } from "./settings.ts";
 
-export function openKiosk(
+export async function openKiosk(
   host: HTMLElement,
   files: Files,
   addresses: Addresses,
   tour: Tour,
   room: Room,
   settings: KioskSettings,
-): void {
+): Promise<void> {
+  const [language = "en"] = tour.languages;
+  await bringWords(...tour.languages); // any of them may be touched, and spoken at once
   const visit: Visit = new Visit(host, files, addresses, tour, room, {
     kiosk: true,
+    language,
     opened: (of) => kiosk.opened(of),
     home: () => kiosk.home(),
   });

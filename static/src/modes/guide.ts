@@ -42,9 +42,9 @@ export class Guide {
     this.#host = host;
     this.#words = words;
     this.#textOf = textOf;
-    this.#previous = button("round", () => this.go(this.#at - 1));
+    this.#previous = button("round", () => this.step(-1));
     this.#play = button("round play", () => this.toggle());
-    this.#next = button("round", () => this.go(this.#at + 1));
+    this.#next = button("round", () => this.step(1));
     this.#close = button("round", () => host.closed());
     this.#previous.append(icon(ICONS.previous));
     this.#next.append(icon(ICONS.next));
@@ -93,9 +93,9 @@ export class Guide {
     this.#host.woken();
   }
 
-  /** Number of the stop one is at, or on the way to. */
-  get at(): number {
-    return this.#at;
+  /** To a stop so many on from this one. */
+  step(by: number): void {
+    this.go(this.#at + by);
   }
 
   /** The visitor took over. */

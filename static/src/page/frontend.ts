@@ -4,7 +4,7 @@ import type { Addresses, Way } from "../address.ts";
 import { element, isTouch } from "../dom.ts";
 import type { Files } from "../files.ts";
 import type { Note, Room, Texts, Tour } from "../tour.ts";
-import { directionOf, textIn, wordsIn, type Words } from "../words.ts";
+import { bringWords, directionOf, textIn, wordsIn, type Words } from "../words.ts";
 import { Cover } from "./cover.ts";
 import { Dock } from "./dock.ts";
 import { Header } from "./header.ts";
@@ -53,6 +53,8 @@ export class Frontend {
   #room: Room;
   #language: string;
   #words: Words;
+  /** The language that was chosen last, whose words may be on their way. */
+  #chosen: string;
   #revealed = false;
 
   constructor(
@@ -72,6 +74,7 @@ export class Frontend {
     this.#room = room;
     this.#events = events;
     this.#language = language;
+    this.#chosen = language;
     this.#words = wordsIn(language);
     this.cover = new Cover(host.querySelector("img") ?? element("img", { alt: "" }));
     this.panel = new Panel(() => events.closed());
@@ -82,7 +85,7 @@ export class Frontend {
       rooms: () => this.#listRooms(),
       about: () => this.#tellAbout(),
       tools: () => this.openTools(),
-      language: (tag) => this.speak(tag),
+      language: (tag) => void this.#choose(tag),
       home: () => events.home(),
     });
     this.#dock = new Dock({ guide: () => events.guide(), see: (way) => events.see(way) });
@@ -218,7 +221,13 @@ export class Frontend {
     this.panel.open(this.#words.rooms, roomsSheet(items));
   }
 
-  /** Speaks another language. */
+  async #choose(language: string): Promise<void> {
+    this.#chosen = language;
+    await bringWords(language);
+    if (language === this.#chosen) this.speak(language);
+  }
+
+  /** Speaks another language, whose words were brought. */
   speak(language: string): void {
     this.#language = language;
     this.#words = wordsIn(language);
@@ -235,8 +244,9 @@ export class Frontend {
     root.lang = this.#language;
     root.dir = directionOf(this.#language);
     document.title = this.title;
-    const room = this.text(this.#room.title);
-    this.#header.say(words, this.#language, this.text(this.#tour.title), room);
+    const tour = this.text(this.#tour.title);
+    this.#host.setAttribute("aria-label", tour);
+    this.#header.say(words, this.#language, tour, this.text(this.#room.title));
     this.#dock.say(words);
     this.map.say(words);
     this.panel.setWords(words.close);

@@ -3,6 +3,9 @@
 import { button, element, ICONS, labelled } from "../dom.ts";
 import type { Words } from "../words.ts";
 
+/** Names that browsers do not know. */
+const UNTOLD: Readonly<Record<string, string>> = { br: "brezhoneg" };
+
 export interface HeaderEvents {
   search(): void;
   rooms(): void;
@@ -76,5 +79,5 @@ export class Header {
 
 /** A language's own name for itself, "français". */
 function nameOf(tag: string): string {
-  return new Intl.DisplayNames([tag], { type: "language" }).of(tag) ?? tag;
+  return UNTOLD[tag] ?? new Intl.DisplayNames([tag], { type: "language" }).of(tag) ?? tag;
 }

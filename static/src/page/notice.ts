@@ -26,6 +26,11 @@ export class Notice {
     this.element.hidden = false;
   }
 
+  /** A line that stays until it is closed. */
+  tellUntilClosed(message: string, close: string): void {
+    this.tell(message, [{ label: close, act: () => undefined }]);
+  }
+
   clear(): void {
     this.element.hidden = true;
   }

@@ -101,7 +101,9 @@ export class PlanSheet {
     const { metres } = this.#plan.scale();
     const perMetre = drawing.getScreenCTM()?.a ?? 0;
     this.#bar.style.width = `${(metres * perMetre).toFixed(0)}px`;
-    this.#length.textContent = `${metres} m`;
+    const language = document.documentElement.lang;
+    const form = new Intl.NumberFormat(language, { style: "unit", unit: "meter" });
+    this.#length.textContent = form.format(metres);
   }
 }
 

@@ -40,7 +40,8 @@ export class Plan {
   readonly #tour: Tour;
   readonly #events: PlanEvents | null;
   readonly #rooms = svg("g");
-  readonly #you = svg("path", { class: "you", d: ARROW });
+  /** Not to be seen before somebody stands on this plan. */
+  readonly #you = svg("path", { class: "you", d: ARROW, hidden: "" });
   #level: number | null = null;
   #low = { x: 0, y: 0 };
   #high = { x: 1, y: 1 };
