@@ -31,6 +31,7 @@ pytestmark = pytest.mark.xdist_group("kiosk")
 
 BACK_WITHIN_S = 10.0
 SOAK_ACTS = 10_000
+SCREEN = (1280, 800)
 DAY_MS = 86_400_000
 MB = 1 << 20
 KILLED_BUILD = Path(__file__).with_name("killed_build.py")
@@ -135,7 +136,7 @@ class Lasting:
 
 @pytest.fixture(scope="module")
 def screen() -> Iterator[str]:
-    with screen_of(1280, 800) as name:
+    with screen_of(*SCREEN) as name:
         yield name
 
 
@@ -211,6 +212,16 @@ def files_of(site: Path) -> list[dict[str, str]]:
 
 def test_a_port_that_is_taken_gives_way_to_the_next(lasting: Lasting) -> None:
     assert "is taken), stop with Ctrl+C" in lasting.kiosk.said
+
+
+def test_it_fills_the_screen(lasting: Lasting) -> None:
+    place = lasting.back().evaluate("[screenX, screenY, innerWidth, innerHeight]")
+    assert place == [0, 0, SCREEN[0] + 1, SCREEN[1] + 1]
+
+
+def test_a_second_kiosk_of_one_folder_is_refused(lasting: Lasting) -> None:
+    assert lasting.start().process.wait(60) == 1
+    assert "expected no other kiosk, found one that shows it" in lasting.kiosk.said
 
 
 def kill_renderer(lasting: Lasting, _: Page) -> None:

@@ -14,6 +14,16 @@ from screen import Kiosk, screen_of, start_kiosk
 from tourgen.cli import main
 from tourgen.kiosk.vigil import COMES_WITHIN_S, GONE_S, HANGS_S, Vigil
 
+OFF_SCREEN = """
+(names) => [...document.querySelectorAll(names)]
+    .filter((each) => each.checkVisibility())
+    .filter((each) => {
+        const { left, top, right, bottom } = each.getBoundingClientRect();
+        return left < 0 || top < 0 || right > innerWidth || bottom > innerHeight;
+    })
+    .map((each) => each.className)
+"""
+
 
 @pytest.fixture(scope="module")
 def screen() -> Iterator[str]:
@@ -43,16 +53,23 @@ def kiosk(
         each.close()
 
 
-def test_it_fills_the_screen(kiosk: Callable[..., Kiosk]) -> None:
-    page = kiosk().page()
-    assert page.evaluate("[screenX, screenY, innerWidth, innerHeight]") == [0, 0, 1281, 801]
-
-
-def test_a_second_kiosk_of_one_folder_is_refused(kiosk: Callable[..., Kiosk]) -> None:
-    kiosk().page()
-    second = kiosk()
-    second.process.wait(30)
-    assert "expected no other kiosk, found one that shows it" in second.said
+@pytest.mark.parametrize("size", [(320, 240), (3840, 1080), (1080, 1920)])
+def test_it_fills_an_odd_screen_and_is_begun_by_a_touch(
+    size: tuple[int, int], kiosk: Callable[..., Kiosk]
+) -> None:
+    with screen_of(*size) as screen:
+        running = kiosk(DISPLAY=screen)
+        page = running.page()
+        shown = page.evaluate("[screenX, screenY, innerWidth, innerHeight]")
+        assert shown == [0, 0, size[0] + 1, size[1] + 1]
+        assert page.evaluate(OFF_SCREEN, ".begin") == []
+        box = page.locator(".begin").last.bounding_box()
+        assert box
+        place = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        running.hand("mousemove", *(str(int(each)) for each in place), "click", "1")
+        running.page("document.getElementById('tour').dataset.state === 'visit'", 10)
+        assert page.evaluate(OFF_SCREEN, ".top button, .dock button") == []
+        running.close()
 
 
 @pytest.mark.parametrize(
