@@ -68,6 +68,7 @@ class Kiosk:
                 for page in browser.contexts[0].pages:
                     if page.evaluate(condition):
                         return page
+                browser.close()  # it goes on: what is given up is the look into it
             except BrowserError:
                 pass
             time.sleep(0.1)

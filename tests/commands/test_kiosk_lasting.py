@@ -15,7 +15,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -23,6 +22,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from disks import MB, Disk, disk_of
 from playwright.sync_api import Error as BrowserError
 from playwright.sync_api import Page, Playwright
 from screen import ATTRACTS, Kiosk, screen_of, start_kiosk
@@ -33,7 +33,6 @@ BACK_WITHIN_S = 10.0
 SOAK_ACTS = 10_000
 SCREEN = (1280, 800)
 DAY_MS = 86_400_000
-MB = 1 << 20
 KILLED_BUILD = Path(__file__).with_name("killed_build.py")
 
 IS_BACK = f"{ATTRACTS} && !document.querySelector('canvas').getContext('webgl2').isContextLost()"
@@ -69,39 +68,6 @@ fetch('.kiosk/visits', { method: 'POST', body: 'x'.repeat(1 << 20) }).then((told
 
 
 # ---- the kiosk that lives through it
-
-
-@dataclass
-class Disk:
-    """A small disk of its own, for what a kiosk keeps.
-
-    Attributes:
-        folder: Where it is mounted, for the programs that `within` starts.
-        holder: What holds it.
-    """
-
-    folder: Path
-    holder: subprocess.Popen[bytes]
-
-    @property
-    def within(self) -> list[str]:
-        """What starts a program that sees it."""
-        alone = ["nsenter", f"--target={self.holder.pid}", "--mount"]
-        return [*alone, *(["--user", "--preserve-credentials"] if os.geteuid() else []), "--"]
-
-    @property
-    def _filling(self) -> Path:
-        return Path(f"/proc/{self.holder.pid}/root{self.folder}/filling")
-
-    def fill(self) -> None:
-        """Leave no room at all."""
-        with suppress(OSError), self._filling.open("ab", buffering=0) as file:
-            while file.write(bytes(MB)):
-                pass
-        assert os.statvfs(self._filling.parent).f_bavail == 0
-
-    def free(self) -> None:
-        self._filling.unlink()
 
 
 @dataclass
@@ -149,16 +115,9 @@ def tour(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 
 @pytest.fixture(scope="module")
 def disk(tour: Path) -> Iterator[Disk]:
-    folder = tour.with_name("disk")
-    folder.mkdir()
     size = 64 * MB + 3 * sum(file.stat().st_size for file in (tour / "site").rglob("*"))
-    script = f"mount -t tmpfs -o size={size} tmpfs {folder} && echo mounted && exec sleep 10000"
-    alone = ["unshare", "--mount", *(["--map-root-user"] if os.geteuid() else [])]
-    with subprocess.Popen([*alone, "sh", "-c", script], stdout=subprocess.PIPE) as holder:
-        assert holder.stdout
-        assert holder.stdout.readline() == b"mounted\n"
-        yield Disk(folder, holder)
-        holder.kill()
+    with disk_of(size, tour.with_name("disk")) as made:
+        yield made
 
 
 @pytest.fixture(scope="module")
@@ -182,8 +141,12 @@ def lasting(
     disk.fill()
     with socket.create_server(("127.0.0.1", 0)) as first:
         kiosk = start(first.getsockname()[1])
-        page = kiosk.page()
-    assert page.evaluate(LACKING, files) == []
+        try:
+            page = kiosk.page()
+            assert page.evaluate(LACKING, files) == []
+        except BaseException:
+            kiosk.close()
+            raise
     disk.free()
     own = urlsplit(page.url).port
     within_s = back_within_s(pytestconfig)
@@ -210,7 +173,9 @@ def files_of(site: Path) -> list[dict[str, str]]:
 # ---- what happens to it
 
 
-def test_a_port_that_is_taken_gives_way_to_the_next(lasting: Lasting) -> None:
+def test_on_a_full_disk_it_starts_and_a_port_that_is_taken_gives_way_to_the_next(
+    lasting: Lasting,
+) -> None:
     assert "is taken), stop with Ctrl+C" in lasting.kiosk.said
 
 
