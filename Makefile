@@ -110,9 +110,10 @@ lint: install
 	cd static && $(NPM) run check
 
 .PHONY: soak
-soak: install system-tests tests/node_modules/.package-lock.json
+soak: demo system-tests tests/node_modules/.package-lock.json
 	$(BIN)/pytest tests/commands/test_kills.py --kills 30
 	$(BIN)/pytest tests/browser/test_wander.py --wander 1800
+	$(BIN)/pytest -rP tests/commands/test_kiosk_lasting.py --tour $(DEMO) --acts 10000
 	$(BIN)/pytest -rP tests/commands/test_kiosk_screen.py --acts 10000
 	$(BIN)/pytest -rP tests/browser/test_kiosk_soak.py --kiosk-visits 160 --kiosk-seconds 3600
 

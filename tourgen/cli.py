@@ -36,7 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
-        _tell(StageError("disk: expected room, found none left", "free some, and build again"))
+        hint = "free some, and run the same line again"
+        _tell(StageError("disk: expected room, found none left", hint))
         return StageError.exit_code
     except KeyboardInterrupt:
         print("stopped; the same line goes on from what is finished", file=sys.stderr)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.server
 import re
 import shutil
+import sys
 from collections.abc import Callable
 from functools import partial
 from http import HTTPStatus
@@ -29,8 +30,9 @@ class TourServer(ThreadingMixIn, http.server.HTTPServer):
     """Serves one folder to several visitors at once."""
 
     daemon_threads = True
-    # A second server on a port in use must find out, not share it.
-    allow_reuse_address = False
+    # Elsewhere a port whose last visitors left a moment ago is free; Windows would share it with a
+    # second server, which must find out instead.
+    allow_reuse_address = sys.platform != "win32"
 
     @property
     def address(self) -> str:
@@ -123,6 +125,7 @@ class TourHandler(http.server.SimpleHTTPRequestHandler):
         """Answer a range with its bytes; everything else as usual."""
         asked = _RANGE.fullmatch(self.headers.get("Range", ""))
         path = Path(self.translate_path(self.path))
+        self._forget_other_date(path)
         if asked is None or not any(asked.groups()) or not path.is_file():
             return super().send_head()
         size = path.stat().st_size
@@ -142,6 +145,12 @@ class TourHandler(http.server.SimpleHTTPRequestHandler):
         self.send_header("Content-Range", f"bytes {first}-{last}/{size}")
         self.end_headers()
         return BytesIO(part)
+
+    def _forget_other_date(self, path: Path) -> None:
+        """Only what is of the very date asked about is the same: an older file is another one."""
+        asked = self.headers.get("If-Modified-Since")
+        if asked and path.is_file() and asked != self.date_time_string(path.stat().st_mtime):
+            del self.headers["If-Modified-Since"]
 
     def send_response(self, code: int, message: str | None = None) -> None:
         """Say that parts may be asked for."""

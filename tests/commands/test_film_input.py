@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
+import subprocess
+import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from disks import MB, disk_of
 
 from tourgen.cli import main
 
@@ -99,3 +104,38 @@ def test_no_chromium(
 def test_a_folder_without_a_site(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = told(capsys, str(tmp_path), "-o", str(tmp_path / "a.mp4"))
     assert "expected a tour's site, found none" in said
+
+
+def test_no_h264(
+    site: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", "/bin/true")
+    said = told(capsys, str(site), "-o", str(tmp_path / "a.mp4"))
+    assert "film: expected an ffmpeg with libx264, for H.264, found `/bin/true` without" in said
+
+
+def test_a_disk_that_fills_in_the_middle(site: Path, tmp_path: Path) -> None:
+    """With room again, the film goes on where it stopped."""
+    with disk_of(16 * MB, tmp_path / "disk") as disk:
+        command = [sys.executable, "-m", "tourgen.cli", "film", site, "-o", disk.folder / "a.mp4"]
+        asked = [*disk.within, *command, "--size", "320x180", "--part", "3-3.5"]
+        with subprocess.Popen(asked, stderr=subprocess.PIPE, text=True) as film:
+            while not (disk.seen / "a.parts/000090.mp4").exists():
+                assert film.poll() is None
+                time.sleep(0.01)
+            disk.fill()
+            assert film.stderr
+            said = film.stderr.read()
+        assert film.returncode == 2
+        fault = f"error: disk of `{disk.folder}[^`]*`: expected room for the film, found none left$"
+        assert len(re.findall(fault, said, re.MULTILINE)) == 1, said
+        assert "Traceback" not in said
+        assert not (disk.seen / "a.mp4").exists()
+        disk.free()
+        done = subprocess.run(asked, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert "15 of 15 frames are there" in done.stderr
+        assert {file.suffix for file in disk.seen.iterdir()} == {".mp4", ".webp", ".vtt"}

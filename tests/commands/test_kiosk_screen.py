@@ -4,108 +4,31 @@ from __future__ import annotations
 
 import os
 import random
-import shutil
-import signal
-import socket
-import subprocess
-import sys
-import time
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Error as BrowserError
-from playwright.sync_api import Page, Playwright
+from playwright.sync_api import Playwright
+from screen import Kiosk, screen_of, start_kiosk
 
 from tourgen.cli import main
 from tourgen.kiosk.vigil import COMES_WITHIN_S, GONE_S, HANGS_S, Vigil
 
-BACK_WITHIN_S = 10.0
-SOAK_ACTS = 10_000
-PATIENCE_S = 90.0
-WATCHED = Path(__file__).with_name("kiosk_watched.py")
-ATTRACTS = (
-    "Boolean(window.tourgen?.ready) && document.getElementById('tour').dataset.state === 'attract'"
-)
+OFF_SCREEN = """
+(names) => [...document.querySelectorAll(names)]
+    .filter((each) => each.checkVisibility())
+    .filter((each) => {
+        const { left, top, right, bottom } = each.getBoundingClientRect();
+        return left < 0 || top < 0 || right > innerWidth || bottom > innerHeight;
+    })
+    .map((each) => each.className)
+"""
 
 
 @pytest.fixture(scope="module")
 def screen() -> Iterator[str]:
-    """A screen without a window manager, as kiosks often have."""
-    reading, writing = os.pipe()
-    command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x800x24"]
-    with subprocess.Popen(
-        [*command, "-nolisten", "tcp"], pass_fds=[writing], stderr=subprocess.DEVNULL
-    ) as server:
-        os.close(writing)
-        with os.fdopen(reading) as told:
-            yield f":{told.readline().strip()}"
-        server.terminate()
-
-
-@dataclass
-class Kiosk:
-    """A kiosk that runs.
-
-    Attributes:
-        process: `tourgen kiosk`.
-        log: What it says.
-        door: Where its browser can be looked into.
-        settings: Its environment.
-    """
-
-    process: subprocess.Popen[bytes]
-    log: Path
-    door: int
-    settings: Mapping[str, str]
-    driver: Playwright
-
-    def page(self, condition: str = ATTRACTS, within_s: float = PATIENCE_S) -> Page:
-        """Its page, once a condition holds in it."""
-        end = time.monotonic() + within_s
-        while time.monotonic() < end:
-            assert self.process.poll() is None, self.log.read_text("utf-8")
-            try:
-                browser = self.driver.chromium.connect_over_cdp(f"http://127.0.0.1:{self.door}")
-                for page in browser.contexts[0].pages:
-                    if page.evaluate(condition):
-                        return page
-            except BrowserError:
-                pass
-            time.sleep(0.1)
-        raise AssertionError(f"{condition}: not so within {within_s} s; {self.log.read_text()}")
-
-    def family(self, kind: str) -> list[int]:
-        """Its browser's processes of a kind."""
-        profile = self.settings["XDG_STATE_HOME"]
-        found = []
-        for folder in Path("/proc").glob("[0-9]*"):
-            try:
-                words = (folder / "cmdline").read_bytes().decode(errors="replace")
-            except OSError:
-                continue
-            if profile in words and f"--type={kind}" in words:
-                found.append(int(folder.name))
-        return found
-
-    def hand(self, *words: str) -> None:
-        """One act of xdotool."""
-        subprocess.run(["xdotool", *words], env=self.settings, check=False, capture_output=True)
-
-    def windows(self) -> list[str]:
-        """Names of what can be seen on the screen."""
-        listed = ["xdotool", "search", "--onlyvisible", "--name", ".+"]
-        found = subprocess.run(listed, env=self.settings, capture_output=True, text=True)
-        return [
-            subprocess.run(
-                ["xdotool", "getwindowname", each],
-                env=self.settings,
-                capture_output=True,
-                text=True,
-            ).stdout.strip()
-            for each in found.stdout.split()
-        ]
+    with screen_of(1280, 800) as name:
+        yield name
 
 
 @pytest.fixture
@@ -115,65 +38,38 @@ def kiosk(
     started: list[Kiosk] = []
 
     def start(folder: Path = site, **more: str) -> Kiosk:
-        state = tmp_path / "state"
-        settings = {**os.environ, "DISPLAY": screen, "XDG_STATE_HOME": str(state), **more}
-        door, port = free_port(), free_port()
+        settings = {
+            **os.environ,
+            "DISPLAY": screen,
+            "XDG_STATE_HOME": str(tmp_path / "state"),
+            **more,
+        }
         log = tmp_path / f"kiosk{len(started)}.log"
-        with log.open("wb") as stream:
-            process = subprocess.Popen(
-                [sys.executable, WATCHED, folder, str(port), str(door)],
-                env=settings,
-                stdout=stream,
-                stderr=stream,
-            )
-        started.append(Kiosk(process, log, door, settings, playwright))
+        started.append(start_kiosk(folder, log, settings, playwright))
         return started[-1]
 
     yield start
     for each in started:
-        each.process.send_signal(signal.SIGINT)
-        assert each.process.wait(15) == 0 or each.log.read_text("utf-8").startswith("error:")
+        each.close()
 
 
-def free_port() -> int:
-    with socket.socket() as asked:
-        asked.bind(("127.0.0.1", 0))
-        return int(asked.getsockname()[1])
-
-
-# ---- what dies comes back
-
-
-def test_whatever_dies_the_tour_attracts_again(
-    kiosk: Callable[..., Kiosk], pytestconfig: pytest.Config
+@pytest.mark.parametrize("size", [(320, 240), (3840, 1080), (1080, 1920)])
+def test_it_fills_an_odd_screen_and_is_begun_by_a_touch(
+    size: tuple[int, int], kiosk: Callable[..., Kiosk]
 ) -> None:
-    """How soon is a matter of the machine: ``make soak`` asks for ten seconds, alone on it."""
-    soak = pytestconfig.getoption("--acts") >= SOAK_ACTS
-    running = kiosk()
-    running.page()
-    for kind in ("renderer", "gpu-process"):
-        begun = time.monotonic()
-        for process in running.family(kind):
-            os.kill(process, signal.SIGKILL)
-        time.sleep(0.5)
-        running.page()
-        back_s = time.monotonic() - begun
-        print(f"{kind} killed: attracts again after {back_s:.1f} s")
-        assert not soak or back_s < BACK_WITHIN_S
-        time.sleep(1)
-    assert "the page is gone" in running.log.read_text("utf-8")
-
-
-def test_it_fills_the_screen(kiosk: Callable[..., Kiosk]) -> None:
-    page = kiosk().page()
-    assert page.evaluate("[screenX, screenY, innerWidth, innerHeight]") == [0, 0, 1281, 801]
-
-
-def test_a_second_kiosk_of_one_folder_is_refused(kiosk: Callable[..., Kiosk]) -> None:
-    kiosk().page()
-    second = kiosk()
-    second.process.wait(30)
-    assert "expected no other kiosk, found one that shows it" in second.log.read_text("utf-8")
+    with screen_of(*size) as screen:
+        running = kiosk(DISPLAY=screen)
+        page = running.page()
+        shown = page.evaluate("[screenX, screenY, innerWidth, innerHeight]")
+        assert shown == [0, 0, size[0] + 1, size[1] + 1]
+        assert page.evaluate(OFF_SCREEN, ".begin") == []
+        box = page.locator(".begin").last.bounding_box()
+        assert box
+        place = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        running.hand("mousemove", *(str(int(each)) for each in place), "click", "1")
+        running.page("document.getElementById('tour').dataset.state === 'visit'", 10)
+        assert page.evaluate(OFF_SCREEN, ".top button, .dock button") == []
+        running.close()
 
 
 @pytest.mark.parametrize(
@@ -193,21 +89,6 @@ def test_what_lacks_is_one_clear_line(
     said = capsys.readouterr().err
     assert said.startswith(f"error: {told}")
     assert "Traceback" not in said
-
-
-# ---- an update
-
-
-def test_an_update_that_was_killed_leaves_a_whole_tour(
-    site: Path, tmp_path: Path, kiosk: Callable[..., Kiosk]
-) -> None:
-    """A build killed between its two renames has put the site aside: see ``site.swap``."""
-    folder = tmp_path / "tour"
-    shutil.copytree(site, folder / ".site.old")
-    shutil.copytree(site / "viewer", folder / ".site.new")
-    running = kiosk(folder / "site")
-    running.page()
-    assert (folder / "site/tour.json").exists()
 
 
 # ---- many hands
@@ -241,7 +122,7 @@ def test_random_keys_clicks_and_drags_lead_nowhere(
     assert page.url.startswith("http://127.0.0.1:")
     assert "/kiosk.html" in page.url
     assert len(page.context.pages) == 1
-    assert "anew" not in running.log.read_text("utf-8")
+    assert "anew" not in running.said
     assert page.evaluate("Boolean(window.tourgen)")
 
 

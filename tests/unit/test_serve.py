@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import os
 import socket
 import threading
 from collections.abc import Iterator
@@ -133,6 +134,18 @@ def test_only_what_is_named_by_its_content_is_kept_for_ever(server: TourServer) 
     assert (unchanged.status, body) == (304, b"")
 
 
+def test_what_is_older_than_the_copy_asked_about_is_sent_all_the_same(
+    server: TourServer, folder: Path
+) -> None:
+    """The clock was set back, or a version before was copied here with its dates."""
+    kept, _ = ask(server, "/r.glb")
+    (folder / "r.glb").write_bytes(b"other")
+    os.utime(folder / "r.glb", (1e9, 1e9))
+    for more in ({}, {"Range": "bytes=0-"}):
+        asked = {"If-Modified-Since": kept.headers["Last-Modified"], **more}
+        assert ask(server, "/r.glb", **asked)[1] == b"other"
+
+
 def test_a_page_that_is_not_there_is_told_by_the_tours_own(
     server: TourServer, folder: Path
 ) -> None:
@@ -167,6 +180,21 @@ def test_takes_the_next_port_that_is_free(folder: Path) -> None:
         with open_server(folder, port=taken) as second:
             assert second.server_address[1] > taken
             assert second.address == f"http://127.0.0.1:{second.server_address[1]}/"
+
+
+def test_has_its_port_again_at_once(folder: Path) -> None:
+    """Under another port a kiosk would find neither its visits nor the tour taken along."""
+    with open_server(folder, port=0) as first:
+        answer = threading.Thread(target=first.handle_request)
+        answer.start()
+        port = first.server_address[1]
+        with socket.create_connection(("127.0.0.1", port)) as visitor:
+            visitor.sendall(b"GET /r.glb HTTP/1.1\r\nConnection: close\r\n\r\n")
+            while visitor.recv(4096):
+                pass
+        answer.join()
+    with open_server(folder, port=port) as second:
+        assert second.server_address[1] == port
 
 
 def test_says_when_no_port_is_free(folder: Path) -> None:

@@ -52,7 +52,7 @@ class KioskHandler(TourHandler):
             self._vigil.begin()
             self._answer(HTTPStatus.OK)
         elif self.path == f"{FOLDER}visits":
-            self._answer(HTTPStatus.OK, self._keep(body))
+            self._keep(body)
         elif self.path == f"{FOLDER}end":
             self._answer(HTTPStatus.OK)
             self._ended.set()
@@ -76,10 +76,17 @@ class KioskHandler(TourHandler):
         finally:
             self._vigil.closed()
 
-    def _keep(self, table: bytes) -> str:
+    def _keep(self, table: bytes) -> None:
         path = self._kept / f"visits-{time.strftime('%Y-%m-%d')}.csv"
-        path.write_bytes(table)
-        return str(path)
+        aside = path.with_suffix(".new")
+        try:
+            aside.write_bytes(table)
+            aside.replace(path)
+        except OSError as error:
+            aside.unlink(missing_ok=True)
+            self._answer(HTTPStatus.INSUFFICIENT_STORAGE, error.strerror or "")
+        else:
+            self._answer(HTTPStatus.OK, str(path))
 
     def _answer(self, status: HTTPStatus, text: str = "") -> None:
         content = text.encode()

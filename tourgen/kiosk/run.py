@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import signal
+import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from threading import Event, Thread
@@ -17,15 +19,15 @@ import platformdirs
 from tourgen.doctor import BROWSERS, browser
 from tourgen.errors import InputError, MissingTool
 from tourgen.kiosk.lines import KioskHandler
-from tourgen.kiosk.screen import has_screen, start_browser, stop_browser
+from tourgen.kiosk.screen import end_leftovers, has_screen, start_browser, stop_browser
 from tourgen.kiosk.vigil import Vigil
 from tourgen.serve import open_server
 from tourgen.site import restore_site
 
 _TICK_S: Final = 0.2
-_SHORT_S: Final = 20.0
-"""A browser that ends sooner may end again: it is waited for ever longer."""
 _MOST_PAUSE_S: Final = 30.0
+_SWAP_S: Final = 2.0
+"""A build that takes longer from one rename to the next was killed between them."""
 
 
 def run_kiosk(site: Path, port: int = 8710, say: Callable[[str], None] = print) -> None:
@@ -54,25 +56,38 @@ def run_kiosk(site: Path, port: int = 8710, say: Callable[[str], None] = print) 
             "start it from the desktop's own session, or set DISPLAY",
         )
     restore_site(site)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # with the browser, as by Ctrl+C
     with _alone(site) as kept:
         vigil, ended = Vigil(), Event()
         answer = partial(KioskHandler, vigil=vigil, ended=ended, kept=kept)
         with open_server(site, port=port, handler=answer) as server:
             Thread(target=server.serve_forever, daemon=True).start()
+            Thread(target=_keep_whole, args=(site, ended), daemon=True).start()
             taken = f" (port {port} is taken)" if server.server_address[1] != port else ""
             say(f"Showing {site} from {server.address}{taken}, stop with Ctrl+C")
             address = f"{server.address}kiosk.html?watched"
+            profile = kept / "browser"
+            end_leftovers(profile)
             try:
-                _keep_showing(program, kept / "browser", address, vigil, ended, say)
+                with suppress(KeyboardInterrupt):
+                    _keep_showing(
+                        partial(start_browser, program, profile, address), vigil, ended, say
+                    )
             finally:
                 ended.set()
                 server.shutdown()
 
 
+def _keep_whole(site: Path, ended: Event) -> None:
+    """Put the site back that a build killed while swapping has left aside."""
+    while not ended.wait(_SWAP_S):
+        if not site.exists() and not ended.wait(_SWAP_S) and not site.exists():
+            with suppress(OSError):  # another build is faster
+                restore_site(site)
+
+
 def _keep_showing(
-    program: Path,
-    profile: Path,
-    address: str,
+    start: Callable[[], subprocess.Popen[bytes]],
     vigil: Vigil,
     ended: Event,
     say: Callable[[str], None],
@@ -81,19 +96,16 @@ def _keep_showing(
     pause_s = 0.0
     while not ended.is_set():
         vigil.begin()
-        begun = time.monotonic()
-        shown = start_browser(program, profile, address)
+        shown = start()
         try:
             fault = _watched(shown.poll, vigil, ended)
-        except KeyboardInterrupt:
-            return
         finally:
             stop_browser(shown)
         if fault is None:
             return
         say(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {fault}; the browser is started anew")
-        lasted = time.monotonic() - begun > _SHORT_S
-        pause_s = 0.0 if lasted else min(max(1.0, 2 * pause_s), _MOST_PAUSE_S)
+        # One that shows nothing may never do: it is waited for ever longer.
+        pause_s = 0.0 if vigil.came else min(max(1.0, 2 * pause_s), _MOST_PAUSE_S)
         ended.wait(pause_s)
 
 

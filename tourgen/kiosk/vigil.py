@@ -54,6 +54,12 @@ class Vigil:
             self._sign = self._now()
 
     @property
+    def came(self) -> bool:
+        """Whether the page has come."""
+        with self._lock:
+            return self._came
+
+    @property
     def fault(self) -> str | None:
         """Why the browser is to be started anew; None where all is well."""
         with self._lock:

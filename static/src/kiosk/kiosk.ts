@@ -22,8 +22,10 @@ import { Watch } from "./watch.ts";
 type State = "attract" | "visit" | "warning" | "asleep";
 
 const TICK_MS = 250;
-/** What fails to come is asked for again, and a picture that stays lost is given up, after so long. */
+/** What fails to come is asked for again after so long. */
 const PATIENCE_S = 6;
+/** A picture that stays lost is given up after so long: a page that begins anew takes a while, too. */
+const LOST_S = 4;
 const NEWS_S = 60;
 /** Who is led or listens for so long without a touch has left. */
 const LED_S = 1200;
@@ -178,7 +180,7 @@ export class Kiosk {
   /** What does not come back by itself is begun anew. */
   #mend(): void {
     const now = performance.now();
-    if (this.#lostSince !== null && now - this.#lostSince > PATIENCE_S * 1000) this.#reload();
+    if (this.#lostSince !== null && now - this.#lostSince > LOST_S * 1000) this.#reload();
     if (!this.#visit.hasFailed) {
       this.#failedSince = null;
       return;
@@ -244,14 +246,15 @@ export class Kiosk {
     panel.open(words.service, ...content);
   }
 
-  async #keep(csv: string): Promise<string | null> {
-    const where = await this.#watch?.post("visits", csv);
-    if (where) return where;
+  /** Keeps the table. Returns what is to be said of it. */
+  async #keep(csv: string): Promise<string> {
+    const { words } = this.#front;
+    if (this.#watch) return (await this.#watch.post("visits", csv)) ?? words.serviceUnsaved;
     const link = document.createElement("a");
     link.href = URL.createObjectURL(new Blob([csv], { type: "text/csv" }));
     link.download = "visits.csv";
     link.click();
     URL.revokeObjectURL(link.href);
-    return null;
+    return words.serviceSaved;
   }
 }

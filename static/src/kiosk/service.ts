@@ -65,8 +65,8 @@ export interface ServiceHost {
   readonly faults: Faults;
   readonly language: string;
   readonly words: Words;
-  /** Keeps the table. Returns where; null where it is saved as browsers do. */
-  keep(csv: string): Promise<string | null>;
+  /** Keeps the table. Returns what is to be said of it. */
+  keep(csv: string): Promise<string>;
   restart(): void;
   /** Closes the browser; null where nobody can. */
   readonly end: (() => void) | null;
@@ -91,8 +91,7 @@ export function serviceSheet(host: ServiceHost): Node[] {
     return made;
   };
   const kept = async (): Promise<void> => {
-    const where = await host.keep(visits.csv);
-    told.textContent = where ?? words.serviceSaved;
+    told.textContent = await host.keep(visits.csv);
   };
   const acts = [act(words.serviceExport, () => void kept()), act(words.serviceRestart, host.restart)];
   if (host.end) acts.push(act(words.serviceEnd, host.end));

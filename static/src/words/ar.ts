@@ -103,6 +103,7 @@ export const ARABIC: Words = {
   serviceFaults: "الأعطال",
   serviceExport: "حفظ الزيارات",
   serviceSaved: "تم الحفظ",
+  serviceUnsaved: "لم يُحفظ: ربما امتلأ القرص",
   serviceRestart: "إعادة التحميل",
   serviceEnd: "إغلاق الكشك",
   serviceDay: "اليوم",

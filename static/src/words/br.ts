@@ -108,6 +108,7 @@ export const BRETON: Words = {
   serviceFaults: "Fazioù",
   serviceExport: "Enrollañ ar gweladennoù",
   serviceSaved: "Enrollet",
+  serviceUnsaved: "N'eo ket bet enrollet: marteze eo leun ar bladenn",
   serviceRestart: "Adkargañ",
   serviceEnd: "Serriñ ar c’hiosk",
   serviceDay: "Deiz",

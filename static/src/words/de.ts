@@ -108,6 +108,7 @@ export const GERMAN: Words = {
   serviceFaults: "Störungen",
   serviceExport: "Besuche speichern",
   serviceSaved: "Gespeichert",
+  serviceUnsaved: "Nicht gespeichert: Der Datenträger ist vielleicht voll",
   serviceRestart: "Neu laden",
   serviceEnd: "Kiosk schließen",
   serviceDay: "Tag",

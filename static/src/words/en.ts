@@ -101,6 +101,7 @@ export const ENGLISH = {
   serviceFaults: "Faults",
   serviceExport: "Save the visits",
   serviceSaved: "Saved",
+  serviceUnsaved: "Not saved: the disk may be full",
   serviceRestart: "Load anew",
   serviceEnd: "Close the kiosk",
   serviceDay: "Day",

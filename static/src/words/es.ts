@@ -107,6 +107,7 @@ export const SPANISH: Words = {
   serviceFaults: "Fallos",
   serviceExport: "Guardar las visitas",
   serviceSaved: "Guardado",
+  serviceUnsaved: "No se ha guardado: puede que el disco esté lleno",
   serviceRestart: "Volver a cargar",
   serviceEnd: "Cerrar el quiosco",
   serviceDay: "Día",

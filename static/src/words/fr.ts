@@ -104,6 +104,7 @@ export const FRENCH: Words = {
   serviceFaults: "Incidents",
   serviceExport: "Enregistrer les visites",
   serviceSaved: "Enregistré",
+  serviceUnsaved: "Non enregistré : le disque est peut-être plein",
   serviceRestart: "Recharger",
   serviceEnd: "Fermer la borne",
   serviceDay: "Jour",

@@ -108,6 +108,7 @@ export const ITALIAN: Words = {
   serviceFaults: "Guasti",
   serviceExport: "Salva le visite",
   serviceSaved: "Salvato",
+  serviceUnsaved: "Non salvato: il disco potrebbe essere pieno",
   serviceRestart: "Ricarica",
   serviceEnd: "Chiudi la postazione",
   serviceDay: "Giorno",

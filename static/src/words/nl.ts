@@ -106,6 +106,7 @@ export const DUTCH: Words = {
   serviceFaults: "Storingen",
   serviceExport: "Bezoeken opslaan",
   serviceSaved: "Opgeslagen",
+  serviceUnsaved: "Niet opgeslagen: de schijf is misschien vol",
   serviceRestart: "Opnieuw laden",
   serviceEnd: "Kiosk sluiten",
   serviceDay: "Dag",

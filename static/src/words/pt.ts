@@ -105,6 +105,7 @@ export const PORTUGUESE: Words = {
   serviceFaults: "Falhas",
   serviceExport: "Guardar as visitas",
   serviceSaved: "Guardado",
+  serviceUnsaved: "Não guardado: o disco pode estar cheio",
   serviceRestart: "Recarregar",
   serviceEnd: "Fechar o quiosque",
   serviceDay: "Dia",
