@@ -141,10 +141,15 @@ export class Rooms {
       : setTimeout(() => this.#fetchAhead(), LULL_MS);
   }
 
+  /** With the next frame: a slow machine may take longer than the lull to draw what came. */
   #fetchAhead(): void {
-    // The tiles ask for the next frame, which begins another lull.
-    if (this.#tiles?.lookAround()) this.#lull = undefined;
-    else void this.#prefetch.neighbours(this.#room);
+    const lull = this.#lull;
+    requestAnimationFrame(() => {
+      if (lull !== this.#lull) return;
+      // The tiles ask for another frame, which begins another lull.
+      if (this.#tiles?.lookAround()) this.#lull = undefined;
+      else void this.#prefetch.neighbours(this.#room);
+    });
   }
 
   #leave(): void {

@@ -538,9 +538,7 @@ export class Visit {
     if (this.#rooms.isOpen) this.#placeSigns();
     this.#tools.frame();
     const guided = this.#guide?.frame(dt) ?? false;
-    // What stands still is drawn after this step; of many new tiles that takes a while.
-    const drawing = !moved && !guided && !this.#stage.still;
-    const busy = drawing || (tiles?.busy ?? false) || (this.#overview?.busy ?? false);
+    const busy = (tiles?.busy ?? false) || (this.#overview?.busy ?? false);
     if (this.#rooms.isOpen) this.#rooms.lookAhead(busy);
     if (moved) return "moving";
     if (guided) return "watching";
