@@ -17,6 +17,7 @@ from playwright.sync_api import Browser, ConsoleMessage, Page, Request, Response
 
 Vector = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]
+Bools = npt.NDArray[np.bool_]
 Visit = Callable[..., "Visitor"]
 """Makes visitors; a test that asks for one fails when something goes wrong in its page."""
 
@@ -35,6 +36,12 @@ UPRIGHT_DEG = 65.0
 """Vertical field of view of the viewer in a wide window."""
 
 WAIT_S = 60
+
+VOID = "ff00ff"
+"""A background that nothing in the rooms looks like."""
+EXCESS = 60
+"""How much a pixel's red and blue exceed its green when a quarter of it is void; nothing in the
+rooms comes near."""
 
 
 @dataclass
@@ -186,3 +193,10 @@ def psnr_db(one: Picture, other: Picture) -> float:
     """Peak signal-to-noise ratio of two pictures."""
     error = np.mean((one.astype(np.float64) - other.astype(np.float64)) ** 2)
     return float(10 * np.log10(255**2 / error)) if error else math.inf
+
+
+def shining(picture: Picture) -> Bools:
+    """The pixels through which the void shines."""
+    red, green, blue = np.moveaxis(picture.astype(np.int16), 2, 0)
+    shines: Bools = np.minimum(red, blue) - green > EXCESS
+    return shines

@@ -13,8 +13,8 @@ import type { Stage } from "./scene/stage.ts";
 import { startOf, type Room, type Tour, type View } from "./tour.ts";
 
 const FADE_MS = 280;
-/** So long nothing was to be done before other rooms are fetched: between levels there is a lull. */
-const LULL_MS = 700;
+/** So long nothing was to be done before what no view asks for yet is fetched. */
+const LULL_MS = 300;
 
 type Phase = "opening" | "open" | "failed";
 
@@ -128,7 +128,8 @@ export class Rooms {
   }
 
   /**
-   * Fetches the rooms next door when nothing else is to be done any more.
+   * Fetches the rest of the room about the view when nothing else is to be done, then the rooms next
+   * door.
    *
    * @param busy Whether something is.
    */
@@ -137,7 +138,18 @@ export class Rooms {
     clearTimeout(this.#lull);
     this.#lull = busy
       ? undefined
-      : setTimeout(() => void this.#prefetch.neighbours(this.#room), LULL_MS);
+      : setTimeout(() => this.#fetchAhead(), LULL_MS);
+  }
+
+  /** With the next frame: a slow machine may take longer than the lull to draw what came. */
+  #fetchAhead(): void {
+    const lull = this.#lull;
+    requestAnimationFrame(() => {
+      if (lull !== this.#lull) return;
+      // The tiles ask for another frame, which begins another lull.
+      if (this.#tiles?.lookAround()) this.#lull = undefined;
+      else void this.#prefetch.neighbours(this.#room);
+    });
   }
 
   #leave(): void {

@@ -18,17 +18,13 @@ import open3d as o3d
 import pytest
 from published import tileset
 from scipy.ndimage import distance_transform_edt
-from visitor import UPRIGHT_DEG, Picture, Vector, Visit, rays
+from visitor import UPRIGHT_DEG, VOID, Bools, Vector, Visit, rays, shining
 
 ROOMS = ("chamber1", "stairs", "chamber2")
 VIEWS = 50
 SIZE = (480, 320)
 CLEARANCE_M = 0.35
 EYE_M = 1.6
-VOID = "ff00ff"
-EXCESS = 60
-"""How much a pixel's red and blue exceed its green when a quarter of it is void; nothing in the
-rooms comes near."""
 RIM_PX = 4
 """Around a true opening, where the surface may end a little sooner or later."""
 OUTLINE = 3
@@ -41,8 +37,6 @@ BEYOND_PX = 40
 PIXEL_RAD = np.radians(UPRIGHT_DEG) / SIZE[1]
 FLAT_LUMINANCE = 2.0
 """Standard deviation, of 255, below which a picture shows nothing."""
-
-Bools = npt.NDArray[np.bool_]
 
 
 class TruthRoom:
@@ -126,13 +120,6 @@ def through(opening: dict[str, Any], cast: npt.NDArray[np.float32], hit: Vector)
     rim = np.hypot(beside, above) if opening["kind"] == "porthole" else np.maximum(beside, above)
     passed: Bools = (rim <= 1) & (reach > 0) & (direction @ outward > 0) & (reach < hit)
     return passed
-
-
-def shining(picture: Picture) -> Bools:
-    """The pixels through which the background shines."""
-    red, green, blue = np.moveaxis(picture.astype(np.int16), 2, 0)
-    shines: Bools = np.minimum(red, blue) - green > EXCESS
-    return shines
 
 
 @pytest.mark.parametrize("room", ROOMS)

@@ -118,6 +118,19 @@ def test_vertices_that_two_tiles_share_decode_to_the_same_bits(
     assert apart.max() <= 0.01 * STEP_M
 
 
+def test_the_document_leaves_out_what_gltf_takes_for_granted() -> None:
+    tile = textured(box_room(1.5, 6, 0.01))
+    document, _ = parts(pack(tile, measured(tile), Settings(grid(tile.uv_mesh.mesh.vertices))))
+    (material,) = document["materials"]
+    assert material.keys() == {"extensions", "pbrMetallicRoughness", "doubleSided"}
+    assert material["pbrMetallicRoughness"] == {
+        "metallicFactor": 0,
+        "baseColorTexture": {"index": 0},
+    }
+    assert "mode" not in document["meshes"][0]["primitives"][0]
+    assert [one.get("normalized") for one in document["accessors"]] == [None, None, None, True]
+
+
 def test_the_document_says_what_the_buffers_hold() -> None:
     tile = textured(box_room(1.5, 6, 0.01))
     glb = pack(tile, measured(tile), Settings(grid(tile.uv_mesh.mesh.vertices)))

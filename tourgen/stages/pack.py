@@ -23,7 +23,7 @@ from tourgen.stages.mesh_arrays import STEP_M
 if TYPE_CHECKING:
     from tourgen.geometry import Float32, Float64, Int32, TexturedMesh, UInt8, UvMesh
 
-VERSION = 3
+VERSION = 4
 
 _MOST_BITS = 24  # a float32 holds no more
 _TEXELS_OF_STEP = 0.25
@@ -63,7 +63,7 @@ class Settings:
 
     grid: Grid
     quality: int = 80
-    webp_method: int = 5
+    webp_method: int = 6
     draco_level: int = 10
 
 
@@ -194,11 +194,12 @@ def _glb(geometry: _Geometry, webp: bytes) -> bytes:
     draco, unlit, picture = "KHR_draco_mesh_compression", "KHR_materials_unlit", "EXT_texture_webp"
     binary = _padded(geometry.data) + _padded(webp)
 
-    def accessor(kind: str, component: int, count: int, **bounds: Any) -> gltf.Accessor:
-        # pygltflib would write an offset of 0, an error where there is no buffer view.
-        return gltf.Accessor(
-            byteOffset=None, componentType=component, count=count, type=kind, **bounds
-        )
+    # What is None is left out, where glTF takes for granted what pygltflib would write: words weigh
+    # on a small tile. An accessor's offset is an error where it has no buffer view.
+    def accessor(kind: str, component: int, count: int, **more: Any) -> gltf.Accessor:
+        usual: dict[str, Any] = {"byteOffset": None, "normalized": None}
+        told = {"componentType": component, "count": count, "type": kind, **more}
+        return gltf.Accessor(**(usual | told))
 
     document = gltf.GLTF2(
         asset=gltf.Asset(generator=f"tourgen {__version__}"),
@@ -214,6 +215,7 @@ def _glb(geometry: _Geometry, webp: bytes) -> bytes:
                         attributes=gltf.Attributes(POSITION=1, TEXCOORD_0=2, **{_INFERRED: 3}),
                         indices=0,
                         material=0,
+                        mode=None,
                         extensions={draco: {"bufferView": 0, "attributes": geometry.attributes}},
                     )
                 ]
@@ -222,10 +224,13 @@ def _glb(geometry: _Geometry, webp: bytes) -> bytes:
         materials=[
             gltf.Material(
                 pbrMetallicRoughness=gltf.PbrMetallicRoughness(
-                    baseColorTexture=gltf.TextureInfo(index=0),
+                    baseColorFactor=None,
+                    baseColorTexture=gltf.TextureInfo(index=0, texCoord=None),
                     metallicFactor=0.0,
-                    roughnessFactor=1.0,
+                    roughnessFactor=None,
                 ),
+                emissiveFactor=None,
+                alphaMode=None,
                 alphaCutoff=None,
                 doubleSided=True,  # simplification folds some faces over; culled, they are holes
                 extensions={unlit: {}},
@@ -248,7 +253,7 @@ def _glb(geometry: _Geometry, webp: bytes) -> bytes:
             accessor("SCALAR", _UNSIGNED_BYTE, geometry.vertices, normalized=True),
         ],
         bufferViews=[
-            gltf.BufferView(buffer=0, byteLength=len(geometry.data)),
+            gltf.BufferView(buffer=0, byteOffset=None, byteLength=len(geometry.data)),
             gltf.BufferView(buffer=0, byteOffset=len(_padded(geometry.data)), byteLength=len(webp)),
         ],
         buffers=[gltf.Buffer(byteLength=len(binary))],

@@ -1,4 +1,11 @@
-/** One room's tileset on screen: streamed by what the view asks for, its root tile first. */
+/**
+ * One room's tileset on screen: streamed by what the view asks for, its root tile first.
+ *
+ * Two levels below the root follow, then the finest: the level that is left out would be drawn over
+ * at once. Only tiles in view are asked for; what lies around is fetched when the view is sharp
+ * (`lookAround`), or when one turns to it. Until it is there the root stands in, since the renderer
+ * itself would show a hole.
+ */
 
 import { TilesRenderer } from "3d-tiles-renderer/three";
 import type { Tile } from "3d-tiles-renderer/core";
@@ -30,6 +37,9 @@ const MIB = 2 ** 20;
 export const CACHE_BYTES = 256 * MIB;
 export const CACHE_BYTES_PHONE = 128 * MIB;
 const ANISOTROPY = 8;
+/** Levels of the tree that are gone into, one after the other. */
+const ROOT_ALONE = 1;
+const TWO_BELOW = 3;
 
 export interface RoomEvents {
   /** Something changed that wants an update of the tiles or a new picture. */
@@ -90,7 +100,9 @@ export class RoomTiles {
     this.#tiles = tiles;
     tiles.manager = decoder;
     tiles.errorTarget = levels === "view" ? ERROR_TARGET_PX : 0;
-    tiles.maxDepth = 1;
+    tiles.maxDepth = ROOT_ALONE;
+    tiles.loadAncestors = false;
+    tiles.loadSiblings = false;
     tiles.lruCache.maxBytesSize = cacheBytes;
     tiles.lruCache.minBytesSize = tiles.lruCache.maxBytesSize * 0.75;
     tiles.setCamera(camera);
@@ -113,8 +125,7 @@ export class RoomTiles {
 
   /** Whether tiles are still to come for the present view. */
   get busy(): boolean {
-    const { queued, downloading, parsing } = statsOf(this.#tiles);
-    return this.#stale || !this.#rootShown || queued + downloading + parsing > 0;
+    return this.#stale || !this.#rootShown || this.#coming > 0;
   }
 
   /** Whether tiles did not come that are asked for again later. */
@@ -137,6 +148,26 @@ export class RoomTiles {
     this.#stale = false;
     this.#tiles.setResolution(camera, size);
     this.#tiles.update();
+    const { root } = this.#tiles;
+    if (!root || !this.#rootShown) return;
+    this.#tiles.lruCache.markUsed(root); // it stands in at any time
+    const { maxDepth } = this.#tiles;
+    if (maxDepth === ROOT_ALONE) {
+      if (root.traversal.visible) this.#goDeeper(TWO_BELOW);
+    } else if (lacksPart(root)) {
+      this.#tiles.loadSiblings = true;
+      this.#fallBack();
+    } else if (maxDepth === TWO_BELOW && this.#coming === 0) {
+      this.#goDeeper(Infinity);
+    }
+  }
+
+  /** Fetches what lies beside the view, so that it can be turned; false where it was told before. */
+  lookAround(): boolean {
+    if (this.#tiles.loadSiblings) return false;
+    this.#tiles.loadSiblings = true;
+    this.#touch();
+    return true;
   }
 
   /** To be called when the camera moved. */
@@ -171,11 +202,30 @@ export class RoomTiles {
     this.#tiles.dispose();
   }
 
+  /** How many tiles are asked for and not there. */
+  get #coming(): number {
+    const { queued, downloading, parsing } = statsOf(this.#tiles);
+    return queued + downloading + parsing;
+  }
+
+  #goDeeper(levels: number): void {
+    this.#tiles.maxDepth = levels;
+    this.#touch();
+  }
+
+  /** Shows the root alone, which then stays until all that the view asks for is there. */
+  #fallBack(): void {
+    this.#tiles.maxDepth = ROOT_ALONE;
+    this.#tiles.update();
+    this.#touch();
+  }
+
   /**
-   * Keeps a tile on screen one of whose children is missing: the renderer would rather show a hole.
-   * Children come on screen all at once, so at this time none of them is.
+   * Shows a tile one of whose children is missing: the renderer would rather show a hole. Those of
+   * its children that are on screen leave it before they are taken out of the tree.
    */
   #standIn(tile: Tile): void {
+    if (!tile.traversal.visible) this.#fallBack();
     if (tile.children?.length) this.#pruned.set(tile, tile.children);
     tile.children = [];
     if (!this.#backoff.later()) this.#events.partFailed();
@@ -197,7 +247,6 @@ export class RoomTiles {
     this.#setSides(scene);
     if (tile.parent === null && !this.#rootShown) {
       this.#rootShown = true;
-      this.#tiles.maxDepth = Infinity;
       this.#events.root(colliderOf(scene));
     }
     this.#touch();
@@ -277,6 +326,20 @@ function colliderOf(scene: Object3D): Collider {
     for (let i = 0; i < count; i++) index.push(start + (geometry.index ? geometry.index.getX(i) : i));
   });
   return new Collider(new Float32Array(positions), new Uint32Array(index));
+}
+
+/** Whether a part of a tile's place that is in view is shown by no tile, be it this or one below. */
+function lacksPart(tile: Tile): boolean {
+  if (!isPrepared(tile)) return true;
+  const { used, inFrustum, visible } = tile.traversal;
+  if (!inFrustum || visible) return false;
+  const children = tile.children ?? [];
+  return !used || children.length === 0 || children.some(lacksPart);
+}
+
+/** Of large rooms not all tiles are prepared in one update, which the types leave out. */
+function isPrepared(tile: Partial<Tile>): boolean {
+  return tile.traversal !== undefined;
 }
 
 /** The renderer's counts, which its types leave out. */
