@@ -10,21 +10,28 @@ SPLIT = " part "
 #: Seconds a megabyte of scan on one core, as the demo's rooms of 20 MB took; 0.02 for a stage not
 #: named.
 _SECONDS = {
-    "stations": 0.05, "ownership": 0.3, "register": 0.22, "sift": 0.24, "exposure": 0.12,
+    "stations": 0.015, "ownership": 0.3, "register": 0.22, "sift": 0.24, "exposure": 0.12,
     "spacing": 0.02, "normals": 0.27, "surface": 1.0, "trim": 0.2, "hygiene": 0.09, "levels": 0.2,
     "tiles": 0.04, "unwrap": 0.55, "floors": 0.1, "colors": 0.12, "bake": 0.45, "inferred": 0.05,
     "pack": 0.08, "poster": 0.15, "measure": 0.08,
 }  # fmt: skip
-#: Stages that work on the surface, which grows less than the scan: its detail has an end.
-_OF_THE_SURFACE = {
-    "surface", "trim", "hygiene", "levels", "tiles", "unwrap", "floors", "bake", "pack", "poster",
-    "measure",
+#: Stages that are given the whole scan: those after them see what is left of crowded points.
+_OF_THE_WHOLE = {"scan", "stations", "ownership"}
+_LEFT_MB = 240.0
+#: Stages that grow less than the scan: they draw some of its points, or work on the surface, whose
+#: detail has an end.
+_SLOWLY_GROWING = {
+    "ownership", "surface", "trim", "hygiene", "levels", "tiles", "unwrap", "floors", "bake",
+    "pack", "poster", "measure",
 }  # fmt: skip
 _USUAL_MB, _GROWTH = 20.0, 0.66
 #: Stages that leave cores idle: most of their work is of the kind that one thread must do.
 _ON_ONE_CORE = {"trim", "hygiene", "levels"}
-#: Peak megabytes a megabyte of scan, beyond those of a process at rest: a room of 228 MB.
-_MEMORY = {"sift": 9, "surface": 12, "trim": 10, "levels": 9, "colors": 10}
+#: Peak megabytes a megabyte of scan, beyond those of a process at rest: rooms of 228 and 2,250 MB.
+_MEMORY = {
+    "scan": 2, "stations": 2, "ownership": 2, "sift": 12, "surface": 14, "trim": 10, "levels": 9,
+    "colors": 12,
+}  # fmt: skip
 _REST_MB = 300
 
 
@@ -47,11 +54,18 @@ def leaves_cores(name: str) -> bool:
 def expected_s(name: str, scan_mb: float) -> float:
     """Seconds that a task takes on one core."""
     stage = stage_of(name)
-    growth = _GROWTH if stage in _OF_THE_SURFACE else 1.0
-    seconds = _SECONDS.get(stage, 0.02) * _USUAL_MB * pow(scan_mb / _USUAL_MB, growth)
+    growth = _GROWTH if stage in _SLOWLY_GROWING else 1.0
+    times = _given_mb(stage, scan_mb) / _USUAL_MB
+    seconds = _SECONDS.get(stage, 0.02) * _USUAL_MB * pow(times, growth)
     return seconds / parts_of(name)
 
 
 def expected_mb(name: str, scan_mb: float) -> float:
     """Megabytes of memory that a task takes at its peak."""
-    return _REST_MB + _MEMORY.get(stage_of(name), 6) * scan_mb / parts_of(name)
+    stage = stage_of(name)
+    return _REST_MB + _MEMORY.get(stage, 6) * _given_mb(stage, scan_mb) / parts_of(name)
+
+
+def _given_mb(stage: str, scan_mb: float) -> float:
+    """Megabytes of a scan that a stage is given."""
+    return scan_mb if stage in _OF_THE_WHOLE else min(scan_mb, _LEFT_MB)

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from dask_cluster import cluster
 from published import published_files
 
 from tourgen.cli import main
-
-DASK = [sys.executable, "-m", "dask"]
-ALONE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
 def built(folder: Path, *arguments: str) -> dict[str, bytes]:
@@ -28,43 +22,6 @@ def built(folder: Path, *arguments: str) -> dict[str, bytes]:
     command = [sys.executable, "-m", "tourgen.cli", "build", str(folder), *arguments]
     subprocess.run(command, check=True, capture_output=True, timeout=600)
     return published_files(folder / "site")
-
-
-@contextmanager
-def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """A scheduler and two workers, as dask's command line starts them."""
-    file = folder / "scheduler.json"
-    there = ["--scheduler-file", str(file), "--no-dashboard"]
-    log = (folder / "dask.log").open("wb")
-
-    def start(*words: str) -> subprocess.Popen[bytes]:
-        command = [*DASK, *words, *there]
-        environment = {**os.environ, **ALONE}
-        return subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, env=environment)
-
-    running = [start("scheduler", "--host", "127.0.0.1", "--port", "0")]
-    worker = ("worker", "--nthreads", "1", "--no-nanny", "--host", "127.0.0.1")
-    running += [start(*worker) for _ in range(2)]
-    try:
-        yield _address(file), running[1:]
-    finally:
-        for each in running:
-            each.kill()
-            each.wait()
-        log.close()
-
-
-def _address(file: Path) -> str:
-    """Of the scheduler, once both workers are there."""
-    from distributed import Client
-
-    for _ in range(300):
-        if file.exists() and file.stat().st_size:
-            break
-        time.sleep(0.1)
-    with Client(scheduler_file=str(file), timeout=30, set_as_default=False) as client:
-        client.wait_for_workers(2, timeout=60)
-        return str(client.scheduler.address)
 
 
 def test_the_same_bytes_from_one_process_from_two_and_from_a_cluster(

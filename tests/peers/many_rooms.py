@@ -1,8 +1,9 @@
 """How a build of many rooms uses two cores: ``python tests/peers/many_rooms.py [--rooms N ...]``.
 
 Tours of the demo's first chamber, each room scanned to some points more than the one before, so
-that none comes out of another's cache. Each is built without a cache on one core and on two; then
-once more with nothing changed, and with another title.
+that none comes out of another's cache. Each is built without a cache on one core and on two, and by
+one and by two workers of a dask cluster; then once more with nothing changed, and with another
+title.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ import sys
 import tomllib
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from dask_cluster import cluster
 from sections import rewrite
 from usage import Usage, measured
 
@@ -25,11 +29,15 @@ POINTS, MORE = 130_000, 100
 MOST_S, MOST_MB = 3600.0, 20_000.0
 HEADING = "Many rooms"
 PREAMBLE = f"""Made by `make bench-rooms`: tours of so many rooms of {POINTS:,} points each, built
-without a cache on one core, and on two, in seconds. `times`: the former over the latter.
-`same`: whether both published the same bytes. Then the same command again: with nothing changed,
-and after the tour's title was.
+without a cache on one core, and on two, in seconds, and by one and by two workers of one thread and
+one core each, of a dask cluster. `times`: the former over the latter. `same`: whether all four
+published the same bytes. Then the same command again: with nothing changed, and after the tour's
+title was.
 """
-COLUMNS = ("rooms", "one core", "two cores", "times", "MB", "same", "unchanged", "title")
+COLUMNS = (
+    *("rooms", "one core", "two cores", "times", "MB"),
+    *("one worker", "two workers", "times", "same", "unchanged", "title"),
+)
 
 
 def main() -> int:
@@ -55,6 +63,8 @@ def _compared(rooms: int, given: argparse.Namespace) -> tuple[str, ...]:
     cores = sorted(os.sched_getaffinity(0))[:2]
     one, by_one = _built(tour, cores[:1])
     two, by_two = _built(tour, cores)
+    worker, by_worker = _clustered(tour, cores[:1])
+    workers, by_workers = _clustered(tour, cores)
     unchanged = _run(tour, cores)
     title = tour / "tour.toml"
     title.write_text(title.read_text("utf-8").replace("Rooms", "Chambers"), encoding="utf-8")
@@ -65,7 +75,10 @@ def _compared(rooms: int, given: argparse.Namespace) -> tuple[str, ...]:
         f"{two.wall_s:.0f}",
         f"{one.wall_s / two.wall_s:.2f}",
         f"{two.peak_mb:,.0f}",
-        "yes" if by_one == by_two else "no",
+        f"{worker.wall_s:.0f}",
+        f"{workers.wall_s:.0f}",
+        f"{worker.wall_s / workers.wall_s:.2f}",
+        "yes" if by_one == by_two == by_worker == by_workers else "no",
         f"{unchanged.wall_s:.2f}",
         f"{named.wall_s:.2f}",
     )
@@ -93,11 +106,17 @@ def _tour(rooms: int, given: argparse.Namespace) -> Path:
     return tour
 
 
-def _built(tour: Path, cores: list[int]) -> tuple[Usage, dict[str, bytes]]:
+def _clustered(tour: Path, cores: list[int]) -> tuple[Usage, dict[str, bytes]]:
+    """The same by a worker on each of some cores."""
+    with cluster(tour.parent, cores) as (address, _):
+        return _built(tour, cores, "--cluster", address)
+
+
+def _built(tour: Path, cores: list[int], *options: str) -> tuple[Usage, dict[str, bytes]]:
     """A build from nothing, and what it published but for its report, which tells seconds."""
     shutil.rmtree(tour / ".tourgen", ignore_errors=True)
     shutil.rmtree(tour / "site", ignore_errors=True)
-    usage = _run(tour, cores)
+    usage = _run(tour, cores, *options)
     files = sorted((tour / "site").rglob("*"))
     return usage, {
         str(file.relative_to(tour)): file.read_bytes()
@@ -106,10 +125,11 @@ def _built(tour: Path, cores: list[int]) -> tuple[Usage, dict[str, bytes]]:
     }
 
 
-def _run(tour: Path, cores: list[int]) -> Usage:
+def _run(tour: Path, cores: list[int], *options: str) -> Usage:
     """``tourgen build`` on some cores, as many tasks at once."""
     command = ["taskset", "--cpu-list", ",".join(map(str, cores)), sys.executable, "-m"]
-    command += ["tourgen.cli", "build", str(tour), "--jobs", str(len(cores))]
+    command += ["tourgen.cli", "build", str(tour)]
+    command += options or ["--jobs", str(len(cores))]
     usage = measured(command, most_s=MOST_S, most_mb=MOST_MB, log=tour.with_suffix(".log"))
     if usage.failed:
         raise SystemExit(f"{tour}: {usage.failed}")

@@ -7,6 +7,7 @@ import io
 import pytest
 from rich.console import Console
 
+from tourgen import expected
 from tourgen.progress import Estimate, ProgressBars, Started, duration
 
 STAGES = ("clean", "normals", "surface", "unwrap", "bake", "pack")
@@ -16,14 +17,22 @@ def test_the_time_left_falls_stage_by_stage(monkeypatch: pytest.MonkeyPatch) -> 
     clock = [0.0]
     monkeypatch.setattr("tourgen.progress.time.monotonic", lambda: clock[0])
     estimate = Estimate(20.0, STAGES)
-    expected = [Estimate(20.0, ahead := STAGES[i:]).left_s(ahead) for i in range(len(STAGES) + 1)]
-    assert expected == sorted(expected, reverse=True)
-    assert expected[-1] == 0
+    left = [Estimate(20.0, ahead := STAGES[i:]).left_s(ahead) for i in range(len(STAGES) + 1)]
+    assert left == sorted(left, reverse=True)
+    assert left[-1] == 0
     assert estimate.done_share(STAGES) == 0
     assert estimate.done_share(()) == 1
     # a machine that took twice as long so far is expected to go on so
-    clock[0] = 2 * (expected[0] - expected[3])
-    assert estimate.left_s(STAGES[3:]) == pytest.approx(2 * expected[3])
+    clock[0] = 2 * (left[0] - left[3])
+    assert estimate.left_s(STAGES[3:]) == pytest.approx(2 * left[3])
+
+
+def test_what_is_crowded_in_a_large_scan_takes_little() -> None:
+    """150 million points took 10.5 minutes beside other work, and were told to take 81."""
+    all_stages = tuple(expected._SECONDS)
+    usual, large, largest = (Estimate(mb, all_stages).left_s(all_stages) for mb in (20, 228, 2250))
+    assert 5 * usual < large < largest
+    assert largest < 2 * large
 
 
 @pytest.mark.parametrize(
