@@ -20,6 +20,8 @@ PATIENCE_S = 90.0
 ATTRACTS = (
     "Boolean(window.tourgen?.ready) && document.getElementById('tour').dataset.state === 'attract'"
 )
+_CONNECT_MS = 2_000
+"""A browser that is just ending may take a call, and never answer."""
 _WATCHED = Path(__file__).parent / "commands/kiosk_watched.py"
 
 
@@ -64,7 +66,9 @@ class Kiosk:
         while time.monotonic() < end:
             assert self.process.poll() is None, self.said
             try:
-                browser = self.driver.chromium.connect_over_cdp(f"http://127.0.0.1:{self.door}")
+                browser = self.driver.chromium.connect_over_cdp(
+                    f"http://127.0.0.1:{self.door}", timeout=_CONNECT_MS
+                )
                 for page in browser.contexts[0].pages:
                     if page.evaluate(condition):
                         return page

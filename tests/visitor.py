@@ -37,6 +37,12 @@ UPRIGHT_DEG = 65.0
 
 WAIT_S = 60
 
+ALONG = (
+    "navigator.serviceWorker.getRegistration().then((found) =>"
+    " found?.active?.state === 'activated' && navigator.serviceWorker.controller !== null)"
+)
+"""The tour was taken along whole."""
+
 VOID = "ff00ff"
 """A background that nothing in the rooms looks like."""
 EXCESS = 60

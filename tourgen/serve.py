@@ -12,7 +12,7 @@ from http import HTTPStatus
 from io import BytesIO
 from pathlib import Path
 from socketserver import ThreadingMixIn
-from typing import TYPE_CHECKING, BinaryIO, Final
+from typing import TYPE_CHECKING, Any, BinaryIO, Final
 
 from tourgen.errors import InputError, StageError
 from tourgen.headers import IMMUTABLE, REVALIDATED, SECURITY_HEADERS, content_type
@@ -33,6 +33,11 @@ class TourServer(ThreadingMixIn, http.server.HTTPServer):
     # Elsewhere a port whose last visitors left a moment ago is free; Windows would share it with a
     # second server, which must find out instead.
     allow_reuse_address = sys.platform != "win32"
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Tell what went wrong, but not that a browser was closed."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
     @property
     def address(self) -> str:

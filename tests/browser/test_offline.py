@@ -10,15 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from published import rooms_of
-from visitor import Visit, Visitor
+from visitor import ALONG, Visit, Visitor
 
 from tourgen.site.offline import WORKER, worker_script
 from tourgen.site.pages import viewer_folder
-
-ALONG = (
-    "navigator.serviceWorker.getRegistration().then((found) =>"
-    " found?.active?.state === 'activated' && navigator.serviceWorker.controller !== null)"
-)
 
 
 @contextmanager

@@ -26,6 +26,7 @@ from disks import MB, Disk, disk_of
 from playwright.sync_api import Error as BrowserError
 from playwright.sync_api import Page, Playwright
 from screen import ATTRACTS, Kiosk, screen_of, start_kiosk
+from visitor import ALONG
 
 pytestmark = pytest.mark.xdist_group("kiosk")
 
@@ -222,6 +223,7 @@ def lose_context(_: Lasting, page: Page) -> None:
 
 def kill_kiosk(lasting: Lasting, page: Page) -> None:
     """The page goes on without its server; the kiosk starts in its place."""
+    page.wait_for_function(ALONG)
     lasting.kiosk.process.kill()
     lasting.kiosk.process.wait()
     assert page.evaluate(LACKING, lasting.files) == []

@@ -150,18 +150,22 @@ def test_the_vigil_tells_why() -> None:
     assert vigil.fault is None
     now = COMES_WITHIN_S + 1
     assert vigil.fault == "the page did not come"
-    vigil.opened()
+    first = vigil.opened()
     assert vigil.fault is None
     now += HANGS_S + 1
     assert vigil.fault == "the page hangs"
     vigil.alive()
     assert vigil.fault is None
-    vigil.closed()
+    vigil.closed(first)
     now += GONE_S / 2  # it is opened anew
     assert vigil.fault is None
-    vigil.opened()
-    vigil.closed()
+    vigil.closed(vigil.opened())
     now += 2 * GONE_S
     assert vigil.fault == "the page is gone"
+    last = vigil.opened()
     vigil.begin()
+    assert vigil.fault is None
+    vigil.opened()
+    vigil.closed(last)  # a dead page's line is found to be broken when the next is there
+    now += 2 * GONE_S
     assert vigil.fault is None

@@ -5,7 +5,9 @@ from __future__ import annotations
 import http.client
 import os
 import socket
+import struct
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -203,6 +205,23 @@ def test_says_when_no_port_is_free(folder: Path) -> None:
         holder.listen()
         with pytest.raises(StageError, match="expected a free port from 65535 on"):
             open_server(folder, port=65535)
+
+
+def test_a_browser_that_dies_is_no_error(
+    server: TourServer, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Each connection that it had open ended in a trace on the screen."""
+    with socket.create_connection(server.server_address[:2]) as visitor:
+        visitor.sendall(b"GET /index.html HTTP/1.1\r\nHost: x\r\n\r\n")
+        visitor.recv(1)
+        at_once = struct.pack("ii", 1, 0)  # as the system does for who was killed
+        visitor.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, at_once)
+    answered = http.client.HTTPConnection(*server.server_address[:2])
+    answered.request("GET", "/index.html")
+    assert answered.getresponse().status == 200
+    answered.close()
+    time.sleep(0.2)
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_serves_nothing_but_tours(tmp_path: Path) -> None:

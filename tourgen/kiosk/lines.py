@@ -65,7 +65,7 @@ class KioskHandler(TourHandler):
         self.send_response(HTTPStatus.OK)
         self.send_header("Content-Type", "text/event-stream")
         self.end_headers()
-        self._vigil.opened()
+        start = self._vigil.opened()
         try:
             self.wfile.write(b"retry: 500\n\n")
             while not self._ended.is_set():
@@ -74,7 +74,7 @@ class KioskHandler(TourHandler):
         except OSError:
             return
         finally:
-            self._vigil.closed()
+            self._vigil.closed(start)
 
     def _keep(self, table: bytes) -> None:
         path = self._kept / f"visits-{time.strftime('%Y-%m-%d')}.csv"

@@ -27,26 +27,29 @@ class Vigil:
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
-        self._now, self._lock = now, Lock()
+        self._now, self._lock, self._start = now, Lock(), 0
         self.begin()
 
     def begin(self) -> None:
         """The browser was started, or the page loads anew."""
         with self._lock:
+            self._start += 1
             self._lines, self._came = 0, False
             self._since = self._sign = self._now()
 
-    def opened(self) -> None:
-        """The page has opened a line."""
+    def opened(self) -> int:
+        """The page has opened a line. Returns which start it is of."""
         with self._lock:
             self._lines, self._came = self._lines + 1, True
             self._since = self._sign = self._now()
+            return self._start
 
-    def closed(self) -> None:
-        """A line is closed."""
+    def closed(self, start: int) -> None:
+        """A line is closed; that of a page before this one is found to be broken late."""
         with self._lock:
-            self._lines = max(0, self._lines - 1)
-            self._since = self._now()
+            if start == self._start:
+                self._lines -= 1
+                self._since = self._now()
 
     def alive(self) -> None:
         """The page has given a sign."""

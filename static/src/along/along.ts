@@ -80,7 +80,8 @@ export async function takeOver(site: URL): Promise<void> {
 function installed(worker: ServiceWorker): Promise<void> {
   return new Promise((done, failed) => {
     const look = (): void => {
-      if (worker.state === "activated") done();
+      // One that waits for the version before to go has all files, too.
+      if (worker.state === "installed" || worker.state === "activated") done();
       if (worker.state === "redundant") failed(new Error("the tour did not come whole"));
     };
     worker.addEventListener("statechange", look);

@@ -171,7 +171,9 @@ export class Kiosk {
   async #update(): Promise<void> {
     this.#askedNews = performance.now();
     const { home } = this.#files;
-    if (!home || !canTakeAlong() || !(await hasNews(home))) return;
+    if (!home || !canTakeAlong()) return;
+    await takeAlong(home).catch(() => undefined); // the disk may have been full before
+    if (!(await hasNews(home))) return;
     if (this.#state !== "attract" && this.#state !== "asleep") return;
     await takeOver(home);
     this.#reload();
