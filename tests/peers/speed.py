@@ -13,6 +13,7 @@ import argparse
 import itertools
 import json
 import shutil
+import subprocess
 import sys
 import tomllib
 from dataclasses import asdict
@@ -39,9 +40,12 @@ OURS = "tourgen"
 BUILDS = {OURS: "", f"{OURS}, poisson": "poisson"}
 """Ours by the surface's method; "" for the default."""
 CHAINS = ("meshlab", "open3d")
+BEFORE, BEFORE_POINTS = "8f85426", 1_300_000
+"""The commit before time was looked at; it builds a scan of so many points in the same run."""
 HEADING = "Time and memory"
 STAGES = """Where tourgen's time goes: seconds from each stage's start to its end; some run beside
-others. With `surface.method = "poisson"` the solve is all of `surface`.
+others. With `surface.method = "poisson"` the solve is all of `surface`. A commit stands for
+tourgen as it was there, before time was looked at.
 """
 PLOT = "pictures/speed.svg"
 SHOWN = """The same against points, both axes logarithmic, each chain at its deeper depth:
@@ -127,6 +131,15 @@ def compared(
             told = json.loads((folder / "site/report.json").read_text("utf-8"))["rooms"][ROOM]
             stages[name] = told["seconds"]
             faces = faces or told["faces"][-1]
+    if points == BEFORE_POINTS:
+        folder = _afresh(tour, BEFORE)
+        path = f"PYTHONPATH={_checkout(given.scratch.resolve() / BEFORE)}"
+        command = ["env", path, sys.executable, "-m", "tourgen.cli", "build", str(folder)]
+        log = tour / f"{BEFORE}.log"
+        usage = measured(command, most_s=MOST_S, most_mb=MOST_MB, log=log)
+        rows.append(row(f"{OURS}, {BEFORE}", usage, folder / "site/rooms" / ROOM))
+        told = json.loads((folder / "site/report.json").read_text("utf-8"))["rooms"][ROOM]
+        stages[f"{OURS}, {BEFORE}"] = told["seconds"]
     eye = truth.stations[0]
     low, high = truth.vertices.min(axis=0) - AROUND_M, truth.vertices.max(axis=0) + AROUND_M
     asked = itertools.product(given.chain or CHAINS, _depths(tour, low, high))
@@ -143,15 +156,26 @@ def compared(
     return rows, stages
 
 
-def _afresh(tour: Path, method: str) -> Path:
-    """A tour's folder without what was built, the surface by a method; itself where none."""
-    folder = tour / method
+def _checkout(folder: Path) -> Path:
+    """The program as it was at ``BEFORE``, in a folder, its viewer compiled."""
+    if not (folder / "static/dist").exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        archive = subprocess.run(["git", "archive", BEFORE], check=True, stdout=subprocess.PIPE)
+        subprocess.run(["tar", "--extract"], check=True, cwd=folder, input=archive.stdout)
+        subprocess.run([sys.executable, "hatch_build.py"], check=True, cwd=folder)
+    return folder
+
+
+def _afresh(tour: Path, variant: str) -> Path:
+    """A tour's folder without what was built, the surface by the variant's method where it is one;
+    the tour itself where none is named."""
+    folder = tour / variant
     folder.mkdir(exist_ok=True)
     shutil.rmtree(folder / ".tourgen", ignore_errors=True)
     shutil.rmtree(folder / "site", ignore_errors=True)
-    if method:
+    if variant:
         told = (tour / "tour.toml").read_text("utf-8")
-        surface = f'[room.surface]\nmethod = "{method}"\n'
+        surface = f'[room.surface]\nmethod = "{variant}"\n' if variant in BUILDS.values() else ""
         (folder / "tour.toml").write_text(f"{told}\n{surface}", encoding="utf-8")
         if not (folder / "scans").exists():
             (folder / "scans").symlink_to(tour / "scans")
@@ -210,10 +234,9 @@ def markdown(rows: list[dict[str, Any]]) -> str:
 
 def stage_table(stages: dict[str, dict[str, float]]) -> str:
     """Seconds of each stage that takes one at least, by the number of points and the method."""
+    named = dict.fromkeys(name for seconds in stages.values() for name in seconds)
     names = [
-        name
-        for name in next(iter(stages.values()))
-        if any(each.get(name, 0) >= _LEAST_S for each in stages.values())
+        name for name in named if any(each.get(name, 0) >= _LEAST_S for each in stages.values())
     ]
     return "\n".join(
         [
