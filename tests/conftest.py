@@ -25,7 +25,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--acts", type=int, default=100, help="random acts at the kiosk (make soak: 10000)"
     )
     parser.addoption(
-        "--kiosk-visits", type=int, default=4, help="visits at the kiosk (make soak: 160)"
+        "--kiosk-visits", type=int, default=2, help="visits at the kiosk (make soak: 160)"
     )
     parser.addoption(
         "--kiosk-seconds", type=float, default=10, help="of a kiosk as it goes (make soak: 3600)"

@@ -15,12 +15,13 @@ from pathlib import Path
 
 from playwright.sync_api import Error as BrowserError
 from playwright.sync_api import Page, Playwright
+from playwright.sync_api import TimeoutError as TimedOut
 
 PATIENCE_S = 90.0
 ATTRACTS = (
     "Boolean(window.tourgen?.ready) && document.getElementById('tour').dataset.state === 'attract'"
 )
-_CONNECT_MS = 2_000
+_CONNECT_MS = 2_000.0
 """A browser that is just ending may take a call, and never answer."""
 _WATCHED = Path(__file__).parent / "commands/kiosk_watched.py"
 
@@ -62,17 +63,18 @@ class Kiosk:
 
     def page(self, condition: str = ATTRACTS, within_s: float = PATIENCE_S) -> Page:
         """Its page, once a condition holds in it."""
-        end = time.monotonic() + within_s
+        end, patience_ms = time.monotonic() + within_s, _CONNECT_MS
         while time.monotonic() < end:
             assert self.process.poll() is None, self.said
             try:
-                browser = self.driver.chromium.connect_over_cdp(
-                    f"http://127.0.0.1:{self.door}", timeout=_CONNECT_MS
-                )
+                door = f"http://127.0.0.1:{self.door}"
+                browser = self.driver.chromium.connect_over_cdp(door, timeout=patience_ms)
                 for page in browser.contexts[0].pages:
                     if page.evaluate(condition):
                         return page
                 browser.close()  # it goes on: what is given up is the look into it
+            except TimedOut:
+                patience_ms *= 2  # on a busy machine it takes its time
             except BrowserError:
                 pass
             time.sleep(0.1)

@@ -267,6 +267,7 @@ def test_the_clock_set_a_day_ahead_and_back_changes_nothing(lasting: Lasting) ->
 @pytest.mark.parametrize("moment", ["write", "swap"])
 def test_an_update_that_is_killed_leaves_the_whole_tour(lasting: Lasting, moment: str) -> None:
     page = lasting.back()
+    page.wait_for_function(ALONG)
     page.evaluate("window.before = true")
     toml = lasting.tour / "tour.toml"
     toml.write_text(toml.read_text("utf-8").replace('en = "', f'en = "{moment} ', 1), "utf-8")
