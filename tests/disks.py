@@ -55,6 +55,8 @@ def disk_of(size: int, folder: Path) -> Iterator[Disk]:
     alone = ["unshare", "--mount", *(["--map-root-user"] if os.geteuid() else [])]
     with subprocess.Popen([*alone, "sh", "-c", script], stdout=subprocess.PIPE) as holder:
         assert holder.stdout
-        assert holder.stdout.readline() == b"mounted\n"
-        yield Disk(folder, holder)
-        holder.kill()
+        try:
+            assert holder.stdout.readline() == b"mounted\n"
+            yield Disk(folder, holder)
+        finally:
+            holder.kill()

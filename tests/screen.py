@@ -21,6 +21,7 @@ PATIENCE_S = 90.0
 ATTRACTS = (
     "Boolean(window.tourgen?.ready) && document.getElementById('tour').dataset.state === 'attract'"
 )
+_ENDS_WITHIN_S = 15.0
 _CONNECT_MS = 2_000.0
 """A browser that is just ending may take a call, and never answer."""
 _WATCHED = Path(__file__).parent / "commands/kiosk_watched.py"
@@ -35,9 +36,11 @@ def screen_of(width: int, height: int) -> Iterator[str]:
         [*command, "-nolisten", "tcp"], pass_fds=[writing], stderr=subprocess.DEVNULL
     ) as server:
         os.close(writing)
-        with os.fdopen(reading) as told:
-            yield f":{told.readline().strip()}"
-        server.terminate()
+        try:
+            with os.fdopen(reading) as told:
+                yield f":{told.readline().strip()}"
+        finally:
+            server.terminate()
 
 
 @dataclass
@@ -70,8 +73,8 @@ class Kiosk:
                 door = f"http://127.0.0.1:{self.door}"
                 browser = self.driver.chromium.connect_over_cdp(door, timeout=patience_ms)
                 for page in browser.contexts[0].pages:
-                    if page.evaluate(condition):
-                        return page
+                    page.wait_for_function(condition, timeout=patience_ms, polling=100)
+                    return page
                 browser.close()  # it goes on: what is given up is the look into it
             except TimedOut:
                 patience_ms *= 2  # on a busy machine it takes its time
@@ -115,7 +118,15 @@ class Kiosk:
     def close(self) -> None:
         """As Ctrl+C does."""
         self.process.send_signal(signal.SIGINT)
-        assert self.process.wait(15) == 0 or self.said.startswith("error:"), self.said
+        try:
+            assert self.process.wait(_ENDS_WITHIN_S) == 0 or self.said.startswith("error:"), (
+                self.said
+            )
+        except BaseException:
+            self.process.kill()
+            for browser in self.family():
+                os.kill(browser, signal.SIGKILL)
+            raise
 
 
 def start_kiosk(

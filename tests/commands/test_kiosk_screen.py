@@ -14,6 +14,8 @@ from screen import Kiosk, screen_of, start_kiosk
 from tourgen.cli import main
 from tourgen.kiosk.vigil import COMES_WITHIN_S, GONE_S, HANGS_S, Vigil
 
+pytestmark = pytest.mark.xdist_group("kiosk")
+
 OFF_SCREEN = """
 (names) => [...document.querySelectorAll(names)]
     .filter((each) => each.checkVisibility())
@@ -67,7 +69,7 @@ def test_it_fills_an_odd_screen_and_is_begun_by_a_touch(
         assert box
         place = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         running.hand("mousemove", *(str(int(each)) for each in place), "click", "1")
-        running.page("document.getElementById('tour').dataset.state === 'visit'", 10)
+        running.page("document.getElementById('tour').dataset.state === 'visit'")
         assert page.evaluate(OFF_SCREEN, ".top button, .dock button") == []
         running.close()
 

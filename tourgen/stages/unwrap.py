@@ -50,6 +50,7 @@ from tourgen.stages.charts import (
     topology,
 )
 from tourgen.stages.flatten import boxes, drawn_twice, flatten
+from tourgen.stages.packing import laid_out
 
 if TYPE_CHECKING:
     from tourgen.geometry import Float64
@@ -61,7 +62,6 @@ _THIN = 2e-3  # texels; a thinner face is drawn as nothing
 _JOIN_ROUNDS = 3
 _LEAST_AREA = 0.1  # of a face, as drawn, for a crumb to stay joined
 _MAX_TEXTURE = 4096
-_BORDER = 1  # texels between the charts and the picture's border
 _COARSER = 1.2
 
 
@@ -211,7 +211,7 @@ def _packed(mesh: Mesh, charts: _Charts, thick: Bool, settings: Settings) -> UvM
     owner = (key // len(mesh.vertices)).astype(np.int64)
     width, height, placed = min(
         (
-            _placed(turned, owner, np.where(thick[:, None], faces, -1), settings.padding_texels)
+            laid_out(turned, owner, np.where(thick[:, None], faces, -1), settings.padding_texels)
             for turned in _turns(flat, owner)
         ),
         key=lambda layout: layout[0] * layout[1],
@@ -231,43 +231,3 @@ def _turns(flat: Float64, owner: Int64) -> tuple[Float64, ...]:
     quarter = np.stack([high[owner, 1] - flat[:, 1], flat[:, 0]], axis=1)
     wide = (high[:, 0] > high[:, 1])[owner, None]
     return flat, np.where(wide, quarter, flat), np.where(wide, flat, quarter)
-
-
-def _placed(flat: Float64, owner: Int64, faces: Int64, padding: int) -> tuple[int, int, Float64]:
-    """Width and height of a picture that holds the charts, and (u, 2) where in it they lie.
-
-    Xatlas stretches charts to whole texels, which would change the size of a texel on the
-    surface, and begins them amid a texel: so of its coordinates only the place of each chart is
-    taken, to whole texels, and a texel more is kept between charts for each of both. It mirrors
-    the charts that it rotates, so they are turned before.
-
-    Args:
-        flat: (u, 2) texels, each chart from (0, 0).
-        owner: (u,) chart of each vertex.
-        faces: (f, 3) indices of vertices, -1 for those that no texel could show.
-        padding: Texels between two charts.
-    """
-    import xatlas
-
-    # It skips faces without area: for those stands one triangle of a texel, the last chart. Given
-    # for each of them, a thousand times the same, it never came to an end.
-    spot = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    shown = faces[faces[:, 0] >= 0]
-    proxy = np.concatenate([shown, len(flat) + np.arange(3)[None]]) if (faces < 0).any() else shown
-    chart = np.append(owner, np.full(3, owner.max()))[proxy[:, 0]]
-    atlas = xatlas.Atlas()
-    atlas.add_uv_mesh(
-        np.concatenate([flat, spot]).astype(np.float32),
-        proxy.astype(np.uint32),
-        chart.astype(np.uint32)[:, None],
-    )
-    options = xatlas.PackOptions()
-    options.texels_per_unit = 1.0
-    options.padding = -(-(padding + 2) // 2)  # it is kept about each of two charts
-    options.rotate_charts = options.rotate_charts_to_axis = False
-    atlas.generate(pack_options=options)
-    _, indices, uvs = atlas.get_mesh(0)
-    size = (atlas.width, atlas.height)
-    low, _ = boxes((uvs.astype(np.float64) * size)[indices].reshape(-1, 2), np.repeat(chart, 3))
-    width, height = (-(-(side + 2 * _BORDER) // 4) * 4 for side in size)
-    return width, height, flat + (np.round(low - 0.5) + _BORDER)[owner]
