@@ -100,7 +100,7 @@ pictures: demo system-tests
 .PHONY: test
 test: install system-tests tests/node_modules/.package-lock.json
 	cd static && $(NPM) test
-	$(BIN)/pytest --numprocesses 2 --dist loadgroup --max-worker-restart 0
+	$(BIN)/pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 .PHONY: lint
 lint: install

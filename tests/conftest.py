@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import fcntl
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from box_tour import write_box_tour
 from miniature import write_miniature
 from playwright.sync_api import Playwright, sync_playwright
+from turns import alone, shared_folder
 
 from tourgen.cli import main
 
@@ -67,11 +66,8 @@ def box_copy(box_tour: Path, tmp_path: Path) -> Path:
 
 def _made_once(factory: pytest.TempPathFactory, name: str, write: Callable[[Path], object]) -> Path:
     """A tour that the first of the test processes builds while the others wait for it."""
-    shared = factory.getbasetemp()
-    if shared.name.startswith("popen-"):  # a worker of pytest-xdist has a folder below the run's
-        shared = shared.parent
-    folder = shared / name
-    with _alone(shared / f"{name}.lock"):
+    folder = shared_folder(factory) / name
+    with alone(folder.with_suffix(".lock")):
         if not (folder / "made").exists():
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir()
@@ -79,10 +75,3 @@ def _made_once(factory: pytest.TempPathFactory, name: str, write: Callable[[Path
             assert main(["build", str(folder)]) == 0
             (folder / "made").touch()
     return folder
-
-
-@contextmanager
-def _alone(lock: Path) -> Iterator[None]:
-    with lock.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield

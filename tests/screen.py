@@ -18,6 +18,8 @@ from playwright.sync_api import Page, Playwright
 from playwright.sync_api import TimeoutError as TimedOut
 
 PATIENCE_S = 90.0
+SCREEN = (1280, 800)
+"""Pixels of the screen that most kiosks of the tests are shown on."""
 ATTRACTS = (
     "Boolean(window.tourgen?.ready) && document.getElementById('tour').dataset.state === 'attract'"
 )

@@ -26,8 +26,6 @@ MAGENTA = np.array([255, 0, 255])
 LOOKS = 10
 """Pictures of the film that are looked through for holes."""
 
-pytestmark = pytest.mark.xdist_group("film")
-
 
 @pytest.fixture(scope="module")
 def cut_s(site: Path) -> float:

@@ -25,14 +25,11 @@ import pytest
 from disks import MB, Disk, disk_of
 from playwright.sync_api import Error as BrowserError
 from playwright.sync_api import Page, Playwright
-from screen import ATTRACTS, Kiosk, screen_of, start_kiosk
+from screen import ATTRACTS, SCREEN, Kiosk, start_kiosk
 from visitor import ALONG
-
-pytestmark = pytest.mark.xdist_group("kiosk")
 
 BACK_WITHIN_S = 10.0
 SOAK_ACTS = 10_000
-SCREEN = (1280, 800)
 DAY_MS = 86_400_000
 KILLED_BUILD = Path(__file__).with_name("killed_build.py")
 
@@ -99,12 +96,6 @@ class Lasting:
         page = self.kiosk.page(f"{condition} && {IS_BACK}", self.within_s)
         assert page.evaluate(LACKING, self.files) == []
         return page
-
-
-@pytest.fixture(scope="module")
-def screen() -> Iterator[str]:
-    with screen_of(*SCREEN) as name:
-        yield name
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,6 @@ from screen import Kiosk, screen_of, start_kiosk
 from tourgen.cli import main
 from tourgen.kiosk.vigil import COMES_WITHIN_S, GONE_S, HANGS_S, Vigil
 
-pytestmark = pytest.mark.xdist_group("kiosk")
-
 OFF_SCREEN = """
 (names) => [...document.querySelectorAll(names)]
     .filter((each) => each.checkVisibility())
@@ -25,12 +23,6 @@ OFF_SCREEN = """
     })
     .map((each) => each.className)
 """
-
-
-@pytest.fixture(scope="module")
-def screen() -> Iterator[str]:
-    with screen_of(1280, 800) as name:
-        yield name
 
 
 @pytest.fixture

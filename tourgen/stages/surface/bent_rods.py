@@ -18,7 +18,6 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import legendre
 from scipy.optimize import least_squares
-from scipy.signal import savgol_filter
 from scipy.spatial import cKDTree
 
 from tourgen.geometry import Float32, Float64
@@ -147,6 +146,8 @@ def traced(rod: Rod, points: Float32, noise_m: float, spacing_m: float) -> tuple
         noise_m: Standard deviation of the points.
         spacing_m: Distance between neighbouring points in the middle of the room.
     """
+    from scipy.signal import savgol_filter  # takes half a second to load
+
     tree = cKDTree(points)
     for _ in range(2):
         rod = _carried_on(Rod(rod.axis[::-1], rod.radius_m), tree, noise_m, spacing_m)
