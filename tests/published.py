@@ -80,6 +80,11 @@ def published_files(site: Path) -> dict[str, bytes]:
     }
 
 
+def tour_of(site: Path) -> dict[str, Any]:
+    """What the viewer is told of the tour."""
+    return dict(json.loads((site / "tour.json").read_text("utf-8")))
+
+
 def rooms_of(site: Path) -> dict[str, dict[str, Any]]:
     """The rooms of tour.json by id."""
     tour = json.loads((site / "tour.json").read_text(encoding="utf-8"))

@@ -75,6 +75,8 @@ class Kiosk:
                 door = f"http://127.0.0.1:{self.door}"
                 browser = self.driver.chromium.connect_over_cdp(door, timeout=patience_ms)
                 for page in browser.contexts[0].pages:
+                    # Unlike `evaluate` it gives up a page that hangs. It does not ask twice: the
+                    # published headers refuse that, and it ends by an error.
                     page.wait_for_function(condition, timeout=patience_ms, polling=100)
                     return page
                 browser.close()  # it goes on: what is given up is the look into it

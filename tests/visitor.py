@@ -13,7 +13,7 @@ from urllib.parse import urlencode
 import numpy as np
 import numpy.typing as npt
 from PIL import Image
-from playwright.sync_api import Browser, ConsoleMessage, Page, Request, Response
+from playwright.sync_api import Browser, ConsoleMessage, Locator, Page, Request, Response
 
 Vector = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]
@@ -34,6 +34,11 @@ CHROMIUM = (
 
 UPRIGHT_DEG = 65.0
 """Vertical field of view of the viewer in a wide window."""
+
+ROOMY = (700, 440)
+"""Pixels of a window in which every control has its place."""
+WAYS = {"Walk": "walk", "Orbit": "orbit", "Dollhouse": "dollhouse", "Plan": "plan"}
+"""How the ways to see are called on the page, and by the viewer."""
 
 WAIT_S = 60
 
@@ -124,7 +129,24 @@ class Visitor:
         )
         self.settle()
 
+    # ---- what one does
+
+    def see(self, way: str) -> None:
+        """Choose a way to see, and wait for it."""
+        self.page.get_by_role("button", name=way, exact=True).click()
+        self.wait(f"window.tourgen.see === {WAYS[way]!r}")
+
+    def use(self, tool: str) -> None:
+        """Choose a tool."""
+        self.page.get_by_role("button", name="Tools", exact=True).click()
+        self.page.locator(".tool-item", has_text=tool).click()
+
     # ---- what one sees
+
+    @property
+    def panel(self) -> Locator:
+        """The panel that is open."""
+        return self.page.locator(".panel:not([hidden])")
 
     def picture(self) -> Picture:
         """The canvas alone, (h, w, 3)."""
@@ -132,8 +154,7 @@ class Visitor:
             "document.querySelectorAll('#tour > :not(canvas)')"
             ".forEach((each) => { each.style.opacity = '0'; each.style.transition = 'none'; })"
         )
-        data = self.page.screenshot(type="png", animations="disabled")
-        return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+        return pixels(self.page.screenshot(type="png", animations="disabled"))
 
     # ---- what goes wrong
 
@@ -193,6 +214,18 @@ def rays(
     directions = ahead + x[None, :, None] * right + y[:, None, None] * up
     origins = np.broadcast_to(position, directions.shape)
     return np.concatenate([origins, directions], axis=2).astype(np.float32)
+
+
+def pixels(screenshot: bytes) -> Picture:
+    """(h, w, 3) of an encoded picture."""
+    return np.asarray(Image.open(io.BytesIO(screenshot)).convert("RGB"))
+
+
+def box_of(each: Locator) -> dict[str, float]:
+    """Where something stands on the page."""
+    box = each.bounding_box()
+    assert box
+    return dict(box)
 
 
 def psnr_db(one: Picture, other: Picture) -> float:

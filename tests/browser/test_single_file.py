@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import pytest
+from published import rooms_of, tour_of
 from visitor import Visit, Visitor
 
 from tourgen.site.pages import viewer_folder
@@ -48,19 +48,11 @@ def opened(singles: Path, visit: Visit) -> Visit:
     return make
 
 
-def tour_of(site: Path) -> dict[str, Any]:
-    return dict(json.loads((site / "tour.json").read_text("utf-8")))
-
-
-def room_of(site: Path, name: str) -> dict[str, Any]:
-    return next(room for room in tour_of(site)["rooms"] if room["id"] == name)
-
-
 def test_one_walks_through_doors_and_back_through_history(site: Path, opened: Visit) -> None:
     here = opened("tour.html")
     here.await_room("chamber1")
-    door = next(link for link in room_of(site, "chamber1")["links"] if link["to"] == "stairs")
-    back = next(link for link in room_of(site, "stairs")["links"] if link["to"] == "chamber1")
+    door = next(link for link in rooms_of(site)["chamber1"]["links"] if link["to"] == "stairs")
+    back = next(link for link in rooms_of(site)["stairs"]["links"] if link["to"] == "chamber1")
     here.teleport(back["arrive"]["position"], door["at"])
     here.page.locator(".door[data-to=stairs]").click()
     here.await_room("stairs")
@@ -95,7 +87,7 @@ def test_all_ways_to_see_and_the_language_stand_in_the_address(site: Path, opene
     here = opened("tour.html")
     here.await_room("chamber1")
     here.page.locator("header select").select_option("fr")
-    assert here.page.locator("header h1").inner_text() == room_of(site, "chamber1")["title"]["fr"]
+    assert here.page.locator("header h1").inner_text() == rooms_of(site)["chamber1"]["title"]["fr"]
     for way, name in (("orbit", "Tourner"), ("dollhouse", "Maquette"), ("plan", "Plan")):
         here.page.locator(".way", has_text=name).click()
         here.wait(f"window.tourgen.see === {way!r}")
@@ -106,7 +98,7 @@ def test_all_ways_to_see_and_the_language_stand_in_the_address(site: Path, opene
     again.await_room("stairs")
     again.wait("window.tourgen.see === 'dollhouse'")
     again.settle()
-    assert again.page.locator("header h1").inner_text() == room_of(site, "stairs")["title"]["fr"]
+    assert again.page.locator("header h1").inner_text() == rooms_of(site)["stairs"]["title"]["fr"]
 
 
 def test_the_guide_leads_into_other_rooms(site: Path, opened: Visit) -> None:
@@ -125,7 +117,7 @@ def test_a_room_by_itself_has_no_door_that_leads_nowhere(site: Path, opened: Vis
     here.await_room("chamber1")
     here.settle()
     assert here.page.locator(".door").count() == 0
-    assert here.page.locator(".note").count() == len(room_of(site, "chamber1")["notes"])
+    assert here.page.locator(".note").count() == len(rooms_of(site)["chamber1"]["notes"])
     here.page.get_by_role("button", name="Tools", exact=True).click()
     assert here.page.locator(".tool-item", has_text="Share").count() == 0, "nobody has this disk"
     here.page.get_by_role("button", name="Guided tour").click()

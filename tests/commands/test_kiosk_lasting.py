@@ -97,6 +97,10 @@ class Lasting:
         assert page.evaluate(LACKING, self.files) == []
         return page
 
+    def along(self) -> Page:
+        """Its page, once the tour is taken along, however long that takes."""
+        return self.kiosk.page(f"{ALONG}.then((along) => along && {IS_BACK})")
+
 
 @pytest.fixture(scope="module")
 def tour(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -214,7 +218,7 @@ def lose_context(_: Lasting, page: Page) -> None:
 
 def kill_kiosk(lasting: Lasting, page: Page) -> None:
     """The page goes on without its server; the kiosk starts in its place."""
-    page.wait_for_function(ALONG)
+    lasting.along()
     lasting.kiosk.process.kill()
     lasting.kiosk.process.wait()
     assert page.evaluate(LACKING, lasting.files) == []
@@ -257,8 +261,7 @@ def test_the_clock_set_a_day_ahead_and_back_changes_nothing(lasting: Lasting) ->
 
 @pytest.mark.parametrize("moment", ["write", "swap"])
 def test_an_update_that_is_killed_leaves_the_whole_tour(lasting: Lasting, moment: str) -> None:
-    page = lasting.back()
-    page.wait_for_function(ALONG)
+    page = lasting.along()
     page.evaluate("window.before = true")
     toml = lasting.tour / "tour.toml"
     toml.write_text(toml.read_text("utf-8").replace('en = "', f'en = "{moment} ', 1), "utf-8")

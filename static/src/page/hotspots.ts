@@ -13,6 +13,7 @@ export interface Spot {
 
 const HIDDEN_BELOW = 0.06;
 const EDGE_PX = 24;
+const MARGIN_PX = 8;
 
 export class Hotspots {
   readonly element = element("nav", { class: "spots" });
@@ -42,13 +43,17 @@ export class Hotspots {
   }
 
   /**
-   * Moves the buttons to where their places are seen.
+   * Moves the buttons to where their places are seen, as far as all of them stays in the picture.
    *
    * @param hidden Whether a place stands behind something.
    */
   place(camera: PerspectiveCamera, size: Vector2, hidden: (at: Vector3) => boolean): void {
     const at = new Vector3();
-    for (const { at: place, button, fade } of this.#spots) {
+    // All are measured before any is moved: the page is laid out once.
+    const spots = this.#spots.map((spot) => {
+      return { ...spot, reach: spot.button.offsetWidth / 2 + MARGIN_PX };
+    });
+    for (const { at: place, button, fade, reach } of spots) {
       at.set(...place);
       const distance = camera.position.distanceTo(at);
       const strength = Math.min(1, Math.max(0, (fade[1] - distance) / (fade[1] - fade[0])));
@@ -61,7 +66,8 @@ export class Hotspots {
       button.classList.toggle("away", !shown);
       if (!inside) continue;
       button.style.setProperty("--strength", strength.toFixed(2));
-      button.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+      const whole = Math.max(reach, Math.min(x, size.x - reach));
+      button.style.transform = `translate(${whole.toFixed(1)}px, ${y.toFixed(1)}px)`;
     }
   }
 }

@@ -1,0 +1,249 @@
+"""Ways to see: orbit, dollhouse, plan, small map, guide, gamepad, headset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from published import rooms_of, tour_of
+from visitor import ROOMY, Vector, Visit, box_of
+
+NODE_MODULES = Path(__file__).parents[1] / "node_modules"
+
+
+def angle_between(one: Vector, other: Vector) -> float:
+    cosine = one @ other / np.linalg.norm(one) / np.linalg.norm(other)
+    return float(np.arccos(np.clip(cosine, -1, 1)))
+
+
+def test_signs_of_doors_are_whole_wherever_one_looks(site: Path, visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.open("rooms/chamber1/index.html", levels="root")
+    (eye, door), seen = (here.position, rooms_of(site)["chamber1"]["links"][0]["at"]), 0
+    sign = here.page.locator(".spot.door:not(.away)")
+    for aside_m in np.linspace(-3, 3, 13):
+        along = np.array(door) - eye
+        across = np.array([along[1], -along[0], 0]) / np.linalg.norm(along[:2])
+        here.teleport(list(eye), list(np.array(door) + aside_m * across))
+        for each in sign.all():
+            box = box_of(each)
+            assert box["x"] >= 0
+            assert box["x"] + box["width"] <= ROOMY[0]
+            seen += 1
+    assert seen > 5
+
+
+def test_a_room_is_turned_about_and_one_comes_down_where_one_clicks(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.see("Orbit")
+    here.settle()
+    outside = here.position
+    assert outside[2] > 3, "above the ceiling"
+    here.page.mouse.move(350, 220)
+    here.page.mouse.down()
+    here.page.mouse.move(470, 220, steps=5)
+    here.page.mouse.up()
+    here.settle()
+    assert np.linalg.norm(here.position - outside) > 1
+    here.page.mouse.click(350, 235)
+    here.wait("window.tourgen.see === 'walk'")
+    here.settle()
+    assert here.position[2] < 2.6
+
+
+def test_the_dollhouse_shows_every_room_in_its_place_and_leads_into_it(
+    site: Path, visit: Visit
+) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.settle()
+    before = here.position
+    here.see("Dollhouse")
+    here.see("Walk")
+    here.settle()
+    assert np.allclose(here.position, before, atol=0.02), "where one stood"
+    here.see("Dollhouse")
+    here.settle()
+    names = here.page.locator(".spot.place:not(.away)")
+    assert sorted(names.all_inner_texts()) == sorted(
+        room["title"]["en"] for room in rooms_of(site).values()
+    )
+    boxes = {each.inner_text(): box_of(each) for each in names.all()}
+    charts, watch = boxes["Chamber of the charts"], boxes["Chamber of the watch"]
+    assert charts["y"] < watch["y"], "it lies a storey higher"
+    names.filter(has_text="Chamber of the charts").click()
+    here.await_room("chamber2")
+    assert here.page.evaluate("window.tourgen.see") == "walk"
+
+
+def test_the_plan_shows_where_one_is_and_leads_to_where_one_clicks(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.see("Plan")
+    plan = here.page.locator(".plan-sheet")
+    assert plan.locator(".plan-room.here").get_attribute("data-room") == "chamber1"
+    assert plan.locator(".scale span").inner_text() in ("1 m", "2 m")
+    assert plan.locator(".compass").is_visible()
+    box = box_of(plan.locator(".plan-room.here .plan-floor"))
+    before = here.position
+    here.page.mouse.click(box["x"] + 0.7 * box["width"], box["y"] + 0.7 * box["height"])
+    here.wait("window.tourgen.see === 'walk'")
+    here.settle()
+    moved = here.position - before
+    assert moved[0] > 0.5, "to the right on paper is x"
+    assert moved[1] < -0.5, "down on paper is -y"
+    here.see("Plan")
+    plan.get_by_role("button", name="Level 1").click()
+    plan.get_by_role("button", name="Chamber of the charts").click()
+    here.await_room("chamber2")
+
+
+def test_the_small_map_turns_up_where_one_walks(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.settle()
+    you = here.page.locator(".map-arrow")
+    before = you.get_attribute("style")
+    here.page.keyboard.down("ArrowLeft")
+    here.page.wait_for_timeout(500)
+    here.page.keyboard.up("ArrowLeft")
+    here.settle()
+    assert you.get_attribute("style") != before
+    marks = here.page.locator(".mini-map .you")
+    assert [mark.is_visible() for mark in marks.all()].count(True) == 1
+    here.page.locator(".mini-map").click()
+    here.wait("window.tourgen.see === 'plan'")
+
+
+def test_the_guide_leads_from_stop_to_stop_and_into_other_rooms(site: Path, visit: Visit) -> None:
+    stops = tour_of(site)["stops"]
+    here = visit(size=ROOMY)
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.page.get_by_role("button", name="Guided tour").click()
+    guide = here.page.locator(".guide")
+    assert guide.locator(".guide-caption").inner_text() == stops[0]["text"]["en"]
+    guide.get_by_role("button", name="Next stop").click()
+    assert guide.locator(".guide-count").inner_text() == f"2 / {len(stops)}"
+    guide.get_by_role("button", name="Pause").click()
+    wanted = np.subtract(stops[1]["look_at"], stops[1]["position"])
+    wanted /= np.linalg.norm(wanted)
+    for _ in range(60):
+        here.page.wait_for_timeout(200)
+        away_m = np.linalg.norm(here.position - stops[1]["position"])
+        if away_m < 0.05 and here.look @ wanted > 0.99:  # it turns to the last
+            break
+    assert np.allclose(here.position, stops[1]["position"], atol=0.1)
+    assert here.look @ wanted > 0.99
+    elsewhere = next(i for i, stop in enumerate(stops) if stop["room"] != "chamber1")
+    for _ in range(elsewhere - 1):
+        guide.get_by_role("button", name="Next stop").click()
+    here.await_room(stops[elsewhere]["room"])
+    assert guide.is_visible()
+    guide.get_by_role("button", name="End the guided tour").click()
+    assert not guide.is_visible()
+
+
+def test_the_guide_goes_on_by_itself_and_waits_when_one_looks_around(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.page.add_init_script(
+        "const fetched = window.fetch;"
+        "window.fetch = async (...all) => {"
+        "  const answer = await fetched(...all);"
+        "  if (!String(all[0]).endsWith('tour.json')) return answer;"
+        "  const tour = await answer.json();"
+        "  tour.stops.forEach((stop) => { stop.seconds = 1; });"
+        "  return new Response(JSON.stringify(tour));"
+        "};"
+    )
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.page.get_by_role("button", name="Guided tour").click()
+    count = here.page.locator(".guide-count")
+    count.wait_for()
+    here.wait("document.querySelector('.guide-count').textContent.startsWith('2 ')")
+    here.page.mouse.move(300, 200)
+    here.page.mouse.down()
+    here.page.mouse.move(360, 200, steps=4)
+    here.page.mouse.up()
+    assert here.page.locator(".guide").get_by_role("button", name="Play").is_visible()
+    stood = count.inner_text()
+    here.page.wait_for_timeout(1500)
+    assert count.inner_text() == stood
+
+
+PAD = """
+const buttons = Array.from({ length: 17 }, () => ({ pressed: false }));
+const pad = { connected: true, axes: [0, 0, 0, 0], buttons };
+navigator.getGamepads = () => [pad];
+window.pad = pad;
+"""
+
+
+def test_a_gamepad_walks_looks_and_opens(site: Path, visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.page.add_init_script(PAD)
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.page.evaluate("window.dispatchEvent(new Event('gamepadconnected'))")
+    before, heading = here.position, here.look
+    here.page.evaluate("pad.axes[2] = 1")
+    here.page.wait_for_timeout(700)
+    here.page.evaluate("pad.axes[2] = 0")
+    assert here.look @ heading < 0.97
+    here.page.evaluate("pad.axes[1] = -1")
+    for _ in range(50):
+        here.page.wait_for_timeout(100)
+        if np.linalg.norm(here.position - before) > 0.15:
+            break
+    here.page.evaluate("pad.axes[1] = 0")
+    assert np.linalg.norm(here.position - before) > 0.15
+    note = rooms_of(site)["chamber1"]["notes"][1]
+    here.page.evaluate(
+        "({ position, look_at }) => window.tourgen.teleport(position, look_at)", note["view"]
+    )
+    here.page.locator(".spot.note:not(.away)", has_text="Plaque").wait_for()
+    here.page.evaluate("pad.buttons[0].pressed = true")
+    here.panel.wait_for()
+    assert here.panel.locator("h2").inner_text() == note["title"]["en"]
+
+
+def test_a_headset_shows_the_room_and_one_leaves_it_at_will(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.page.add_init_script(path=NODE_MODULES / "iwer/build/iwer.min.js")
+    here.page.add_init_script(
+        "window.headset = new IWER.XRDevice(IWER.metaQuest3);"
+        "headset.installRuntime({ forceInstall: true });"
+    )
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.settle()
+    before = here.position
+    here.use("Virtual reality")
+    here.wait("window.tourgen.isImmersed")
+    here.wait("window.tourgen.stats.frames > 5")
+    assert abs(here.position[2] - before[2]) < 0.5
+    heading = here.look
+    here.page.evaluate("headset.controllers.right.updateAxes('thumbstick', 1, 0)")
+    for _ in range(40):
+        here.page.wait_for_timeout(50)
+        if here.look @ heading < 0.95:
+            break
+    turned = np.degrees(angle_between(here.look[:2], heading[:2]))
+    assert turned == pytest.approx(30, abs=3), "one step, however long the stick is held"
+    here.page.evaluate("headset.controllers.right.updateAxes('thumbstick', 0, 0)")
+    here.page.evaluate(
+        "headset.controllers.right.position.set(0.2, 1.3, -0.2);"
+        "headset.controllers.right.quaternion.set(-0.38, 0, 0, 0.92);"
+        "headset.controllers.right.updateButtonValue('trigger', 1)"
+    )
+    here.page.wait_for_timeout(400)
+    stood = here.position
+    here.page.evaluate("headset.controllers.right.updateButtonValue('trigger', 0)")
+    for _ in range(40):
+        here.page.wait_for_timeout(50)
+        if np.linalg.norm(here.position - stood) > 0.4:
+            break
+    assert np.linalg.norm(here.position - stood) > 0.4, "to where one pointed"
+    here.page.evaluate("headset.controllers.right.updateButtonValue('squeeze', 1)")
+    here.wait("!window.tourgen.isImmersed")
+    here.settle()
+    assert abs(here.position[2] - before[2]) < 0.3

@@ -1,0 +1,66 @@
+"""When something fails: tiles asked for again, graphics that come back, a page without either."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from visitor import ROOMY, Visit, pixels
+
+
+def test_a_tile_that_fails_is_asked_for_again(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    failed: list[str] = []
+
+    def answer(route: Any) -> None:
+        url = route.request.url
+        if not url.endswith("/r.glb") and failed.count(url) < 2:
+            failed.append(url)
+            route.fulfill(status=503, body="")
+        else:
+            route.continue_()
+
+    here.page.route("**/*.glb", answer)
+    here.open("rooms/chamber1/index.html")
+    for _ in range(100):
+        here.page.wait_for_timeout(200)
+        if failed and here.page.evaluate("window.tourgen.idle && window.tourgen.stats.tiles > 3"):
+            break
+    here.settle()
+    assert here.stats["tiles"] > 3
+    assert here.page.locator(".notice:not([hidden])").count() == 0
+    here.forgive("503", "Failed to load tile")
+
+
+def test_a_lost_graphics_context_comes_back(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.settle()
+    before = here.page.screenshot(clip={"x": 150, "y": 120, "width": 400, "height": 200})
+    here.page.evaluate(
+        "(() => { const gl = document.querySelector('canvas').getContext('webgl2');"
+        "window.graphics = gl.getExtension('WEBGL_lose_context'); graphics.loseContext(); })()"
+    )
+    here.page.locator(".notice:not([hidden])").wait_for()
+    here.page.evaluate("graphics.restoreContext()")
+    here.wait("document.querySelector('.notice').hidden")
+    here.settle()
+    here.page.wait_for_timeout(300)
+    after = here.page.screenshot(clip={"x": 150, "y": 120, "width": 400, "height": 200})
+    one, other = (pixels(each).astype(int) for each in (before, after))
+    assert np.abs(one - other).mean() < 2
+    here.forgive("CONTEXT_LOST", "Context Lost")
+
+
+def test_without_webgl_the_page_tells_all(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null;")
+    here.page.goto(f"{here.origin}/rooms/chamber1/index.html")
+    here.page.locator(".notice").wait_for()
+    plain = here.page.locator("main.plain")
+    assert plain.is_visible()
+    assert plain.locator("h1").first.inner_text() == "Chamber of the watch"
+    around = plain.locator(".around img")
+    around.scroll_into_view_if_needed()
+    here.wait("document.querySelector('.around img').naturalWidth === 2048")
+    assert plain.get_by_role("heading", name="Box bed").is_visible()
