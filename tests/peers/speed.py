@@ -133,8 +133,9 @@ def compared(
             faces = faces or told["faces"][-1]
     if points == BEFORE_POINTS:
         folder = _afresh(tour, BEFORE)
-        path = f"PYTHONPATH={_checkout(given.scratch.resolve() / BEFORE)}"
-        command = ["env", path, sys.executable, "-m", "tourgen.cli", "build", str(folder)]
+        there = _checkout(given.scratch.resolve() / BEFORE)
+        command = ["env", f"--chdir={there}", f"PYTHONPATH={there}"]  # else it is today's
+        command += [sys.executable, "-m", "tourgen.cli", "build", str(folder)]
         log = tour / f"{BEFORE}.log"
         usage = measured(command, most_s=MOST_S, most_mb=MOST_MB, log=log)
         rows.append(row(f"{OURS}, {BEFORE}", usage, folder / "site/rooms" / ROOM))
