@@ -263,7 +263,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         picture.continued,
         oriented,
         lit,
-        simplified,
+        sound,
         settings=bake.Settings(),
         version=bake.VERSION,
         libraries=("numba", "scipy"),

@@ -17,6 +17,7 @@ from tourgen.fitting.surface import Detail, Drawn
 from tourgen.geometry import (
     Float32,
     Float64,
+    Mesh,
     OrientedCloud,
     Panorama,
     PointCloud,
@@ -207,11 +208,11 @@ def _pixels_on(places: Float32, panoramas: tuple[Panorama, ...]) -> Float64:
 def continued(
     oriented: OrientedCloud,
     cloud: PointCloud,
-    simplified: levels.Levels,
+    surface: Mesh,
     settings: bake.Settings,
 ) -> PointCloud:
     """Points that continue the picture of floors where they were not seen."""
-    return bake.continued_floors(cloud, oriented, simplified.finest, settings)
+    return bake.continued_floors(cloud, oriented, surface, settings)
 
 
 def indexed(

@@ -90,5 +90,5 @@ def icon(poster: bytes, size: int) -> bytes:
         left, top = ((length - side) // 2 for length in picture.size)
         square = picture.convert("RGB").crop((left, top, left + side, top + side))
     drawn = io.BytesIO()
-    square.resize((size, size), Image.Resampling.LANCZOS).save(drawn, "PNG", optimize=True)
+    square.resize((size, size), Image.Resampling.LANCZOS).save(drawn, "PNG")
     return drawn.getvalue()

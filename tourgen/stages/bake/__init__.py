@@ -37,7 +37,7 @@ __all__ = [
     "vistas",
 ]
 
-VERSION = 13
+VERSION = 14
 
 
 def bake(

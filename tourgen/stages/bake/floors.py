@@ -36,7 +36,7 @@ def continued_floors(
     Args:
         cloud: Every point kept by cleaning.
         oriented: Points with normals, among them those laid where scanners stood.
-        surface: The room at its finest level.
+        surface: The room.
         settings: Where the texel of a floor has no support, it is continued.
 
     Returns:
@@ -78,7 +78,7 @@ def _continued(
     row, column = (each.ravel() for each in np.mgrid[:rows, :columns])
     at = low + (np.stack([column, row], axis=1) + 0.5) * pixel_m
     places = np.column_stack([at, _with_one(at) @ plane]).astype(np.float32)
-    own = _is_floor(places, surface)
+    own = _is_floor(places, surface, plane)
     told = around.nearest(places, 1, settings.reach_m)[0][:, 0] >= 0
     shown = np.flatnonzero(told)
     picture = np.zeros((rows * columns, 3), np.float32)
@@ -100,11 +100,15 @@ def _with_one(points: npt.NDArray[np.floating]) -> Float64:
     return np.column_stack([points[:, :2], np.ones(len(points))]).astype(np.float64)
 
 
-def _is_floor(places: Float32, surface: Mesh) -> Bool:
+def _is_floor(places: Float32, surface: Mesh, plane: npt.NDArray[np.floating]) -> Bool:
     """(n,) where the surface lies at a place of the plane."""
     down = np.array([0, 0, -1], np.float32)
     above = places + _NEAR_M * np.array([0, 0, 1], np.float32)
-    scene = ray_scene(surface.vertices, surface.faces)
+    height_m = (surface.vertices[:, 2] - _with_one(surface.vertices) @ plane)[surface.faces]
+    near = (height_m.min(axis=1) < 2 * _NEAR_M) & (height_m.max(axis=1) > -2 * _NEAR_M)
+    if not near.any():
+        return np.zeros(len(places), np.bool_)
+    scene = ray_scene(surface.vertices, surface.faces[near])
     hit = scene.cast_rays(rays_of(above, np.broadcast_to(down, above.shape)))["t_hit"].numpy()
     return np.asarray(hit < 2 * _NEAR_M)
 
