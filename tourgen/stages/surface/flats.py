@@ -25,6 +25,7 @@ from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import components
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.symmetric import axes_of
+from tourgen.threads import in_parts
 from tourgen.voxels import grouped, voxels
 
 _SURFEL = 2.5
@@ -52,6 +53,7 @@ _NARROW = 0.5
 """Standard deviation across of a strip's surfels, in their edges, at most."""
 _ROUNDS = 4
 _AROUND = 4
+_PART = 1 << 15
 
 Ints = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
@@ -409,18 +411,40 @@ def _nearest(planes: TangentPlanes, flats: Flats, label: Int32) -> tuple[Ints, F
         flats: See there.
         label: (n, k) numbers of the flats near each, -1 for none.
     """
-    best = np.full(len(label), np.inf, np.float32)
-    chosen = np.full(len(label), -1)
-    height_at = np.zeros(len(label), np.float32)
-    limit = np.float32(_POINT_OFF * planes.noise_m)
-    for plane in label.T:
-        asked = np.flatnonzero(plane >= 0)
-        normal = flats.normals[plane[asked]].astype(np.float32)
-        height = np.einsum("ij,ij->i", planes.points[asked], normal)
-        height -= flats.offsets_m[plane[asked]].astype(np.float32)
-        turned = np.einsum("ij,ij->i", planes.normals[asked], normal)
-        cost = np.abs(height) / limit + 2 * (1 - turned)
-        better = (np.abs(height) < limit) & (turned > _TURNED) & (cost < best[asked])
-        at = asked[better]
-        best[at], chosen[at], height_at[at] = cost[better], plane[at], height[better]
-    return chosen, height_at
+    chosen, height = np.full(len(label), -1), np.zeros(len(label), np.float32)
+    normals, offsets_m = flats.normals.astype(np.float32), flats.offsets_m.astype(np.float32)
+    most_m = np.float32(_POINT_OFF * planes.noise_m)
+
+    def choose(first: int, last: int) -> None:
+        some = slice(first, last)
+        lying = planes.points[some], planes.normals[some], label[some]
+        _choose(normals, offsets_m, most_m, *lying, chosen[some], height[some])
+
+    in_parts(choose, len(label), _PART)
+    return chosen, height
+
+
+@compiled
+def _choose(
+    flat_normals: Float32,
+    offsets_m: Float32,
+    most_m: np.float32,
+    points: Float32,
+    normals: Float32,
+    label: Int32,
+    chosen: Ints,
+    height_m: Float32,
+) -> None:
+    """Write what ``_nearest`` tells of some tangent planes."""
+    for i in range(len(points)):
+        best = np.float32(np.inf)
+        for flat in label[i]:
+            if flat < 0:
+                continue
+            height, turned = -offsets_m[flat], np.float32(0)
+            for axis in range(3):
+                height += points[i, axis] * flat_normals[flat, axis]
+                turned += normals[i, axis] * flat_normals[flat, axis]
+            cost = abs(height) / most_m + 2 * (1 - turned)
+            if abs(height) < most_m and turned > _TURNED and cost < best:
+                best, chosen[i], height_m[i] = cost, flat, height

@@ -114,6 +114,7 @@ def _rods(
 ) -> tuple[tuple[Rod, ...], Mask]:
     """The rods that points so far apart tell, and which are theirs; ``tree`` holds the points."""
     at = np.flatnonzero(rest)
+    points = raw[at]
     taken = np.zeros(len(raw), bool)
 
     def crowding(rod: Rod, members: Ints) -> float:
@@ -122,39 +123,31 @@ def _rods(
         return _crowding(rod, tree, of_rods, spacing_m)
 
     rods_found = []
-    for stick in sorted(_sticks(raw[at], spacing_m), key=len, reverse=True):
+    for stick in sorted(_sticks(points, spacing_m), key=len, reverse=True):
         own = at[stick]
         own = own[~taken[own]]
         if len(own) < _POINTS or crowding(_outline(raw[own]), own) > _HOPELESS:
             continue
         if _is_flanked(planes, raw, own, tree):
             continue
-        found = _straight(planes, raw, at, own, spacing_m) or _bent(
-            planes, raw, at[~taken[at]], own, spacing_m
-        )
+        rod = _fitted(raw[own], planes.normals[own], planes.noise_m, spacing_m)
+        if rod:
+            rod, on = _lengthened(rod, points, planes.noise_m, spacing_m)
+            found: tuple[Rod, Ints] | None = (rod, at[on])
+        else:
+            found = _bent(planes, raw, at[~taken[at]], own, spacing_m)
         if found and crowding(*found) < _CROWDED:
             rod, members = found
             rods_found.append(rod)
             taken[members] = True
-            taken[at[_beside(rod, raw[at], spacing_m)]] = True
+            taken[at[_beside(rod, points, spacing_m)]] = True
     return tuple(rods_found), taken
-
-
-def _straight(
-    planes: TangentPlanes, raw: Float32, at: Ints, own: Ints, spacing_m: float
-) -> tuple[Rod, Ints] | None:
-    """The straight rod that a stick is a piece of, and which points, of some, are on it."""
-    rod = _fitted(raw[own], planes.normals[own], planes.noise_m, spacing_m)
-    if rod is None:
-        return None
-    rod, on = _lengthened(rod, raw[at], planes.noise_m, spacing_m)
-    return rod, at[on]
 
 
 def _bent(
     planes: TangentPlanes, raw: Float32, at: Ints, own: Ints, spacing_m: float
 ) -> tuple[Rod, Ints] | None:
-    """The same of a bent one."""
+    """The bent rod that a stick is a piece of, and which points, of some, are on it."""
     piece = bent(raw[own], planes.normals[own], planes.noise_m)
     found = piece and traced(piece, raw[at], planes.noise_m, spacing_m)
     return (found[0], at[found[1]]) if found else None
