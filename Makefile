@@ -115,7 +115,7 @@ LASTING := -o faulthandler_timeout=0
 .PHONY: soak
 soak: demo system-tests tests/node_modules/.package-lock.json
 	$(BIN)/pytest $(LASTING) tests/commands/test_kills.py --kills 30
-	$(BIN)/pytest $(LASTING) tests/browser/test_wander.py --wander 1800
+	$(BIN)/pytest $(LASTING) tests/browser/test_wander.py --wander 1800 --tour $(DEMO)
 	$(BIN)/pytest $(LASTING) -rP tests/commands/test_kiosk_lasting.py --tour $(DEMO) --acts 10000
 	$(BIN)/pytest $(LASTING) -rP tests/commands/test_kiosk_screen.py --acts 10000
 	$(BIN)/pytest $(LASTING) -rP tests/browser/test_kiosk_soak.py --kiosk-visits 160 --kiosk-seconds 3600
