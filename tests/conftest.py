@@ -29,7 +29,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--kiosk-seconds", type=float, default=10, help="of a kiosk as it goes (make soak: 3600)"
     )
-    parser.addoption("--kills", type=int, default=1, help="builds that are killed (make soak: 30)")
+    parser.addoption("--kills", type=int, default=2, help="builds that are killed (make soak: 30)")
 
 
 @pytest.fixture(scope="session")

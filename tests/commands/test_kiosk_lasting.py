@@ -29,6 +29,7 @@ from screen import ATTRACTS, SCREEN, Kiosk, start_kiosk
 from visitor import ALONG
 
 BACK_WITHIN_S = 10.0
+ALONG_WITHIN_S = 30.0
 SOAK_ACTS = 10_000
 DAY_MS = 86_400_000
 KILLED_BUILD = Path(__file__).with_name("killed_build.py")
@@ -98,8 +99,8 @@ class Lasting:
         return page
 
     def along(self) -> Page:
-        """Its page, once the tour is taken along, however long that takes."""
-        return self.kiosk.page(f"{ALONG}.then((along) => along && {IS_BACK})")
+        """Its page, once the tour is taken along."""
+        return self.kiosk.page(f"{ALONG}.then((along) => along && {IS_BACK})", ALONG_WITHIN_S)
 
 
 @pytest.fixture(scope="module")

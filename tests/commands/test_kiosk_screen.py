@@ -61,7 +61,7 @@ def test_it_fills_an_odd_screen_and_is_begun_by_a_touch(
         assert box
         place = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         running.hand("mousemove", *(str(int(each)) for each in place), "click", "1")
-        running.page("document.getElementById('tour').dataset.state === 'visit'")
+        running.page("document.getElementById('tour').dataset.state === 'visit'", 10)
         assert page.evaluate(OFF_SCREEN, ".top button, .dock button") == []
         running.close()
 
