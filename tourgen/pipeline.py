@@ -218,7 +218,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         spaced,
         settings=surface.Detail(detail_mm),
         version=levels.VERSION,
-        libraries=("fast-simplification",),
+        libraries=("fast-simplification", "open3d"),
     )
     tree = task(
         "tiles",

@@ -1,9 +1,9 @@
 """Levels: the room's finest mesh, and the coarse one that shows it at once.
 
-Both are simplified over the whole room by fast-simplification (quadric error metric, Garland and
-Heckbert 1997). Where a room has many more faces than are wanted, most of them go block by block
-before, with locked borders: a face at work takes half a kilobyte. The levels between are made tile
-by tile in ``tiles``.
+Both are simplified over the whole room (see ``simplify``), the coarse one with more care, since it
+is what one sees first and walks in. Where a room has many more faces than are wanted, most of them
+go block by block before, with locked borders: a face at work takes half a kilobyte. The levels
+between are made tile by tile in ``tiles``.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from tourgen.geometry import Mesh
 from tourgen.stages.halving import halved
 from tourgen.stages.mesh_arrays import compact, face_areas, on_grid, weld
-from tourgen.stages.simplify import simplified
+from tourgen.stages.simplify import coarsened, simplified
 
-VERSION = 3
+VERSION = 4
 _BLOCK_FACES = 1_000_000
 _LEFT = 2.0
 """Faces that blocks leave, over those that are wanted in the end."""
@@ -53,11 +53,13 @@ def levels(mesh: Mesh, settings: Settings) -> Levels:
     """Simplify to the finest and the coarsest level."""
     edge_m = settings.face_detail_ratio * settings.detail_m
     wanted = int(face_areas(mesh).sum() / (edge_m**2 * np.sqrt(3) / 4))
-    finest = _simplify(mesh, min(max(wanted, settings.root_faces), settings.most_faces))
-    return Levels(finest, _simplify(finest, settings.root_faces))
+    finest = _finest(mesh, min(max(wanted, settings.root_faces), settings.most_faces))
+    if len(finest.faces) <= settings.root_faces:
+        return Levels(finest, finest)
+    return Levels(finest, on_grid(coarsened(finest, settings.root_faces)))
 
 
-def _simplify(mesh: Mesh, faces: int) -> Mesh:
+def _finest(mesh: Mesh, faces: int) -> Mesh:
     if len(mesh.faces) <= faces:
         return on_grid(mesh)
     if len(mesh.faces) > max(_BLOCK_FACES, 2 * _LEFT * faces):

@@ -23,7 +23,7 @@ from tourgen.stages.levels import Levels
 from tourgen.stages.mesh_arrays import compact, components, face_adjacency, on_grid, weld
 from tourgen.stages.simplify import simplified
 
-VERSION = 3
+VERSION = 4
 _ISLAND_FACES = 60
 _IDS = "0123456789abcdefghijklmnopqrstuvwxyz"
 

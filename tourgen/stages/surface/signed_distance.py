@@ -71,7 +71,7 @@ from tourgen.stages.surface.tangent_planes import (
 )
 from tourgen.stages.surface.tubes import Rod, with_tubes
 
-VERSION = 19
+VERSION = 20
 _APART = 3.0
 """Spacings between points that stand apart."""
 _HANDFUL = 12
