@@ -72,8 +72,8 @@ function nameOf(source) {
   throw new Error(`${source}: expected an output, found none`);
 }
 
-/** The outputs that the room needs as soon as the script runs, so that they can be asked for ahead. */
-function soonAfter(source) {
+/** What runs before a script can, it included, so that all of it can be asked for at once. */
+function neededBy(source) {
   const found = new Set();
   const follow = (path) => {
     if (found.has(path)) return;
@@ -90,7 +90,8 @@ function soonAfter(source) {
 
 const manifest = {
   script: nameOf("src/main.ts"),
-  soon: soonAfter("src/visit.ts"),
+  first: neededBy("src/main.ts"),
+  soon: neededBy("src/visit.ts"),
   style: nameOf("src/page/style.css"),
   kiosk: nameOf("src/kiosk/kiosk.css"),
   draco,

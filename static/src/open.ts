@@ -1,6 +1,7 @@
 /**
  * Lets the page stand, then opens the room that page and address say, or shows the plain page. The
- * poster is all that a visitor waits for: whatever the room needs is asked for after it.
+ * poster is all that a visitor waits for: whatever the room needs is asked for after it, on a phone
+ * when the page stands, which is read first there.
  */
 
 import { takeAlongInTime } from "./along/along.ts";
@@ -49,12 +50,14 @@ export async function open(
   const kiosk = host.dataset["kiosk"];
   keepIcon();
   const touched = touch();
-  if (!films) await Promise.race([touched, quiet(host)]);
+  const stands = quiet(host);
+  if (!films && isTouch()) await Promise.race([touched, stands]);
+  const coming = fetchTour(files);
   if (files.home) askAhead(host, files);
   void bringWords(own); // most likely the tour's, too, which is not known yet
   let tour;
   try {
-    tour = await fetchTour(files);
+    tour = await coming;
   } catch (error) {
     console.warn(error);
     return give("noTour");
@@ -71,7 +74,7 @@ export async function open(
   if (files.home) void askForRoom(files, room);
   const language = chooseLanguage(tour.languages, wishes);
   const spoken = bringWords(language);
-  if (isTouch() && kiosk === undefined) await Promise.race([touched, pause(READING_MS)]);
+  await Promise.race([touched, isTouch() && kiosk === undefined ? pause(READING_MS) : stands]);
   if (!canDraw()) return give("noWebgl");
   if (kiosk !== undefined) {
     const { openKiosk } = await import("./kiosk/open.ts");
@@ -79,7 +82,8 @@ export async function open(
   }
   const [{ Visit }] = await Promise.all([import("./visit.ts"), spoken]);
   const manner = { kiosk: false, language, opened: () => undefined, home: () => undefined };
-  new Visit(host, files, addresses, tour, room, manner).start(found === null);
+  const visit = await Visit.of(host, files, addresses, tour, room, manner);
+  visit.start(found === null);
   if (files.home) takeAlongInTime(files.home, tour);
 }
 

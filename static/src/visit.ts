@@ -7,7 +7,7 @@ import type { Files } from "./files.ts";
 import { Frontend } from "./page/frontend.ts";
 import { chooseLanguageForGood } from "./past.ts";
 import { Rooms } from "./rooms.ts";
-import { tileDecoder } from "./scene/room-tiles.ts";
+import { tileDecoder } from "./scene/tile-decoder.ts";
 import { Stage, type Pace } from "./scene/stage.ts";
 import { Tools } from "./tools.ts";
 import { startOf, type Room, type Tour } from "./tour.ts";
@@ -54,13 +54,28 @@ export class Visit {
   readonly #tools: Tools;
   readonly #pointing: Pointing;
 
-  constructor(
+  /** Makes a visit while what decodes its tiles starts. */
+  static async of(
     host: HTMLElement,
     files: Files,
     addresses: Addresses,
     tour: Tour,
     room: Room,
     manner: Manner,
+  ): Promise<Visit> {
+    const { manager, started } = tileDecoder(files);
+    await started;
+    return new Visit(host, files, addresses, tour, room, manner, manager);
+  }
+
+  private constructor(
+    host: HTMLElement,
+    files: Files,
+    addresses: Addresses,
+    tour: Tour,
+    room: Room,
+    manner: Manner,
+    manager: LoadingManager,
   ) {
     this.#addresses = addresses;
     this.#tour = tour;
@@ -86,7 +101,6 @@ export class Visit {
     this.front = front;
     const stage = new Stage(front.canvas, query.background, (dt) => this.#frame(dt));
     this.#stage = stage;
-    const manager: LoadingManager = tileDecoder(files);
     const rooms: Rooms = new Rooms(files, tour, room, stage, front, manager, query.levels, {
       expected: (view) => this.#walking.wait(view),
       opened: (of, view, collider) => {

@@ -6,7 +6,7 @@ from surfaces import mesh, sheet
 
 from tourgen.errors import StageError
 from tourgen.geometry import TexturedMesh, UvMesh, View
-from tourgen.stages.poster import Settings, poster
+from tourgen.stages.poster import Scene, Settings, poster
 
 SMALL = Settings(width=64, height=48, field_of_view_deg=60.0, void=(14, 16, 20))
 QUARTERS = [(250, 0, 0), (0, 250, 0), (0, 0, 250), (250, 250, 0)]
@@ -30,7 +30,7 @@ def view(position: tuple[float, float, float], look_at: tuple[float, float, floa
 
 
 def test_the_picture_is_upright_and_not_mirrored() -> None:
-    picture = poster([wall()], view((0, -0.05, 1.2), (0, 0, 0)), SMALL)
+    picture = poster(Scene([wall()]), view((0, -0.05, 1.2), (0, 0, 0)), SMALL)
     assert picture.shape == (48, 64, 3)
     assert picture.dtype == np.uint8
     corners = [picture[18, 26], picture[18, 38], picture[30, 26], picture[30, 38]]
@@ -39,13 +39,13 @@ def test_the_picture_is_upright_and_not_mirrored() -> None:
 
 def test_the_field_of_view_is_the_one_asked_for() -> None:
     far = 1 / np.tan(np.radians(30)) * 1.25  # the square covers 80 % of the height
-    picture = poster([wall()], view((0, 0, far), (0, 0, 0)), SMALL)
+    picture = poster(Scene([wall()]), view((0, 0, far), (0, 0, 0)), SMALL)
     red_or_green = picture[:, 32].max(1) > 200
     assert red_or_green.sum() == pytest.approx(0.8 * 48, abs=1)
 
 
 def test_where_nothing_is_the_void_shows() -> None:
-    picture = poster([wall()], view((0, 0, 5), (0, 9, 5)), SMALL).astype(int)
+    picture = poster(Scene([wall()]), view((0, 0, 5), (0, 9, 5)), SMALL).astype(int)
     assert np.abs(picture[0] - SMALL.void).max() <= 1
 
 
@@ -57,7 +57,7 @@ def test_faces_are_seen_from_behind_too() -> None:
         np.zeros((40, 40, 3), np.uint8),
     )
     eye = view((0, -0.05, 1.2), (0, 0, 0))
-    assert (poster([shade, wall()], eye, SMALL) == 0).all()
+    assert (poster(Scene([shade, wall()]), eye, SMALL) == 0).all()
 
 
 def test_the_nearer_tile_hides_the_farther() -> None:
@@ -67,10 +67,10 @@ def test_the_nearer_tile_hides_the_farther() -> None:
         UvMesh(raised, near.uv_mesh.uv, near.uv_mesh.chart, (40, 40), 0.05),
         np.full((40, 40, 3), 77, np.uint8),
     )
-    picture = poster([wall(), grey], view((0, -0.05, 1.0), (0, 0, 0)), SMALL)
+    picture = poster(Scene([wall(), grey]), view((0, -0.05, 1.0), (0, 0, 0)), SMALL)
     assert (picture[20:28, 28:36] == 77).all()
 
 
 def test_no_tile_is_an_error() -> None:
     with pytest.raises(StageError, match="at least 1 tile, found 0"):
-        poster([], view((0, 0, 0), (1, 0, 0)), SMALL)
+        poster(Scene([]), view((0, 0, 0), (1, 0, 0)), SMALL)

@@ -294,9 +294,10 @@ def pictured(
     from PIL import Image, ImageOps
 
     leaves = [each for tile, each in zip(room, chain(*parts), strict=True) if not tile.children]
-    first = Image.fromarray(poster.poster(leaves, view, settings))
+    scene = poster.Scene(leaves)
+    first = Image.fromarray(poster.poster(scene, view, settings))
     preview = ImageOps.fit(first, _PREVIEW, Image.Resampling.LANCZOS)
-    around = Image.fromarray(poster.around(leaves, view, settings))
+    around = Image.fromarray(poster.around(scene, view, settings))
     return {
         "poster.webp": _encoded(first, "WEBP", method=6),
         "preview.jpg": _encoded(preview, "JPEG", optimize=True, progressive=True),

@@ -43,21 +43,57 @@ class Settings:
     void: tuple[int, int, int] = (205, 216, 224)
 
 
-def poster(tiles: Sequence[TexturedMesh], view: View, settings: Settings) -> UInt8:
-    """Render the room from one view.
+class Scene:
+    """Tiles that rays can be cast at.
 
     Args:
         tiles: Those to be seen, commonly the leaves of the tile tree.
+
+    Raises:
+        StageError: Where there is no tile.
+    """
+
+    def __init__(self, tiles: Sequence[TexturedMesh]) -> None:
+        import open3d as o3d
+
+        if not tiles:
+            raise StageError("poster: expected at least 1 tile, found 0")
+        self._scene = o3d.t.geometry.RaycastingScene()
+        self._tiles: dict[int, tuple[Float32, UInt8]] = {}
+        for tile in tiles:
+            mesh = tile.uv_mesh.mesh
+            key = self._scene.add_triangles(
+                o3d.core.Tensor(np.ascontiguousarray(mesh.vertices)),
+                o3d.core.Tensor(mesh.faces.astype(np.uint32)),
+            )
+            self._tiles[int(key)] = tile.uv_mesh.uv[mesh.faces], tile.texture
+
+    def look(self, eye: Float32, directions: Float32, void: tuple[int, int, int]) -> Float32:
+        """(n, 3) what each ray sees; ``void`` where it meets nothing."""
+        colors = np.tile(np.array(void, np.float32), (len(directions), 1))
+        answer = self._scene.cast_rays(rays_of(eye, directions))
+        hit = {name: value.numpy() for name, value in answer.items()}
+        order = np.argsort(hit["geometry_ids"], kind="stable")
+        keys, first = np.unique(hit["geometry_ids"][order], return_index=True)
+        for key, which in zip(keys, np.split(order, first[1:]), strict=True):
+            tile = self._tiles.get(int(key))
+            if tile is not None:  # else there is nothing
+                face, at = hit["primitive_ids"][which], hit["primitive_uvs"][which]
+                _paint(which, face, at, *tile, colors)
+        return colors
+
+
+def poster(scene: Scene, view: View, settings: Settings) -> UInt8:
+    """Render the room from one view.
+
+    Args:
+        scene: What is to be seen.
         view: The camera; up is z, or y where the camera looks straight up or down.
         settings: See there.
 
     Returns:
         (height, width, 3) uint8, sRGB.
-
-    Raises:
-        StageError: Where there is no tile.
     """
-    scene = _Scene(tiles)
     directions = _directions(view, settings)
     eye = view.position.astype(np.float32)
     picture = np.empty((settings.height, settings.width, 3), np.float32)
@@ -70,21 +106,17 @@ def poster(tiles: Sequence[TexturedMesh], view: View, settings: Settings) -> UIn
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 
-def around(tiles: Sequence[TexturedMesh], view: View, settings: Settings) -> UInt8:
+def around(scene: Scene, view: View, settings: Settings) -> UInt8:
     """Render all that is seen from one place, as an equirectangular picture.
 
     Args:
-        tiles: Those to be seen.
+        scene: What is to be seen.
         view: The eye, and what shall be in the middle.
         settings: See there.
 
     Returns:
         (around_width / 2, around_width, 3) uint8, sRGB; zenith at the top.
-
-    Raises:
-        StageError: Where there is no tile.
     """
-    scene = _Scene(tiles)
     width, height = settings.around_width, settings.around_width // 2
     ahead = view.look_at - view.position
     middle = np.arctan2(ahead[1], ahead[0])
@@ -115,39 +147,6 @@ def _directions(view: View, settings: Settings) -> Float32:
     down = (1 - (np.arange(height) + 0.5) / height * 2) * half
     directions = forward + across[None, :, None] * right + down[:, None, None] * up
     return np.asarray(directions, np.float32)
-
-
-class _Scene:
-    """Tiles that rays can be cast at."""
-
-    def __init__(self, tiles: Sequence[TexturedMesh]) -> None:
-        import open3d as o3d
-
-        if not tiles:
-            raise StageError("poster: expected at least 1 tile, found 0")
-        self._scene = o3d.t.geometry.RaycastingScene()
-        self._tiles: dict[int, tuple[Float32, UInt8]] = {}
-        for tile in tiles:
-            mesh = tile.uv_mesh.mesh
-            key = self._scene.add_triangles(
-                o3d.core.Tensor(np.ascontiguousarray(mesh.vertices)),
-                o3d.core.Tensor(mesh.faces.astype(np.uint32)),
-            )
-            self._tiles[int(key)] = tile.uv_mesh.uv[mesh.faces], tile.texture
-
-    def look(self, eye: Float32, directions: Float32, void: tuple[int, int, int]) -> Float32:
-        """(n, 3) what each ray sees; ``void`` where it meets nothing."""
-        colors = np.tile(np.array(void, np.float32), (len(directions), 1))
-        answer = self._scene.cast_rays(rays_of(eye, directions))
-        hit = {name: value.numpy() for name, value in answer.items()}
-        order = np.argsort(hit["geometry_ids"], kind="stable")
-        keys, first = np.unique(hit["geometry_ids"][order], return_index=True)
-        for key, which in zip(keys, np.split(order, first[1:]), strict=True):
-            tile = self._tiles.get(int(key))
-            if tile is not None:  # else there is nothing
-                face, at = hit["primitive_ids"][which], hit["primitive_uvs"][which]
-                _paint(which, face, at, *tile, colors)
-        return colors
 
 
 @compiled

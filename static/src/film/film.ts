@@ -9,7 +9,7 @@ import { readQuery, type FilmPlan } from "../diagnostics.ts";
 import { element } from "../dom.ts";
 import type { Files } from "../files.ts";
 import { readingS } from "../modes/stay.ts";
-import { tileDecoder } from "../scene/room-tiles.ts";
+import { tileDecoder } from "../scene/tile-decoder.ts";
 import { Stage } from "../scene/stage.ts";
 import { roomCalled, type Room, type Tour } from "../tour.ts";
 import { directionOf, textIn, wordsIn } from "../words.ts";
@@ -60,7 +60,7 @@ export class Film {
     this.#stage.hold();
     // Where two tiles meet the first one drawn wins: not the first one that came, as else.
     this.#stage.renderer.setOpaqueSort((a, b) => a.object.name.localeCompare(b.object.name, "en"));
-    this.#scenery = new Scenery(files, this.#stage, tileDecoder(files), levels);
+    this.#scenery = new Scenery(files, this.#stage, tileDecoder(files).manager, levels);
     this.#reel = this.#cut();
     window.tourgen = { film: { plan: () => this.#plan(), frame: (t) => this.#frame(t) } };
   }

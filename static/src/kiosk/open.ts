@@ -18,7 +18,7 @@ export async function openKiosk(
 ): Promise<void> {
   const [language = "en"] = tour.languages;
   await bringWords(...tour.languages); // any of them may be touched, and spoken at once
-  const visit: Visit = new Visit(host, files, addresses, tour, room, {
+  const visit: Visit = await Visit.of(host, files, addresses, tour, room, {
     kiosk: true,
     language,
     opened: (of) => kiosk.opened(of),

@@ -12,22 +12,19 @@ import type { Tile } from "3d-tiles-renderer/core";
 import {
   DoubleSide,
   FrontSide,
-  LoadingManager,
   Mesh,
   MeshBasicMaterial,
   Raycaster,
   type Group,
   type Intersection,
+  type LoadingManager,
   type Object3D,
   type PerspectiveCamera,
   type Vector2,
 } from "three";
-import { DRACOLoader } from "three/addons/loaders/DRACOLoader.js";
-import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import type { Files } from "../files.ts";
 import { Collider } from "../walk/collider.ts";
 import { Backoff } from "./backoff.ts";
-import { BINARY, WRAPPER } from "./decoder.ts";
 import { boxOf, checkerboard, type Levels } from "./levels.ts";
 import { tinted } from "./tint.ts";
 
@@ -63,19 +60,6 @@ export interface RoomTilesOptions {
   readonly levels: Levels;
   /** How many bytes of tiles are held, at most. */
   readonly cacheBytes: number;
-}
-
-/** What every room's tiles are decoded with; made once. */
-export function tileDecoder(files: Files): LoadingManager {
-  const manager = new LoadingManager();
-  const draco = new DRACOLoader(manager);
-  draco.setDecoderPath({
-    js: files.source(WRAPPER),
-    wasm: files.source(BINARY),
-  });
-  draco.preload();
-  manager.addHandler(/\.glb$/, new GLTFLoader(manager).setDRACOLoader(draco));
-  return manager;
 }
 
 export class RoomTiles {
@@ -268,7 +252,7 @@ export class RoomTiles {
       return url.endsWith(".json") ? (JSON.parse(new TextDecoder().decode(data)) as object) : data;
     }
     const expected = Number(response.headers.get("content-length") ?? 0);
-    const parts: BlobPart[] = [];
+    const parts: Uint8Array[] = [];
     let got = 0;
     const reader = response.body.getReader();
     for (let next = await reader.read(); !next.done; next = await reader.read()) {
@@ -277,7 +261,8 @@ export class RoomTiles {
       this.#events.progress(expected > 0 ? Math.min(1, got / expected) : 0.5);
     }
     this.#bytes += got;
-    return new Blob(parts).arrayBuffer();
+    setTimeout(() => this.#tiles.parseQueue.tryRunJobs()); // or it would wait for a picture
+    return joined(Uint8Array, parts).buffer;
   }
 }
 
@@ -312,20 +297,39 @@ function materialsOf(scene: Object3D): MeshBasicMaterial[] {
 /** All triangles below `scene`, in the frame of the room. */
 function colliderOf(scene: Object3D): Collider {
   scene.updateMatrixWorld(true);
-  const positions: number[] = [];
-  const index: number[] = [];
+  const corners: Float32Array[] = [];
+  const faces: Uint32Array[] = [];
+  let count = 0;
   scene.traverse((object) => {
     if (!(object instanceof Mesh)) return;
-    const start = positions.length / 3;
-    const geometry = (object as Mesh).geometry.clone().applyMatrix4(object.matrixWorld);
-    const corners = geometry.getAttribute("position");
-    for (let i = 0; i < corners.count; i++) {
-      positions.push(corners.getX(i), corners.getY(i), corners.getZ(i));
-    }
-    const count = geometry.index ? geometry.index.count : corners.count;
-    for (let i = 0; i < count; i++) index.push(start + (geometry.index ? geometry.index.getX(i) : i));
+    const { geometry, matrixWorld } = object as Mesh;
+    const position = geometry.getAttribute("position").clone().applyMatrix4(matrixWorld);
+    const index = geometry.index?.array ?? Array.from({ length: position.count }, (_, i) => i);
+    const start = count;
+    faces.push(Uint32Array.from(index, (corner) => start + corner));
+    corners.push(new Float32Array(position.array));
+    count += position.count;
   });
-  return new Collider(new Float32Array(positions), new Uint32Array(index));
+  return new Collider(joined(Float32Array, corners), joined(Uint32Array, faces));
+}
+
+interface Numbers extends ArrayLike<number> {
+  readonly buffer: ArrayBuffer;
+  set(from: ArrayLike<number>, at: number): void;
+}
+
+/** Arrays one after the other in one. */
+function joined<Kind extends Numbers>(
+  kind: new (length: number) => Kind,
+  parts: readonly ArrayLike<number>[],
+): Kind {
+  const whole = new kind(parts.reduce((length, part) => length + part.length, 0));
+  let at = 0;
+  for (const part of parts) {
+    whole.set(part, at);
+    at += part.length;
+  }
+  return whole;
 }
 
 /** Whether a part of a tile's place that is in view is shown by no tile, be it this or one below. */

@@ -1,0 +1,36 @@
+/** What every room's tiles are decoded with; made once. */
+
+import { LoadingManager } from "three";
+import { DRACOLoader } from "three/addons/loaders/DRACOLoader.js";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import type { Files } from "../files.ts";
+import { BINARY, WRAPPER } from "./decoder.ts";
+
+/** A triangle in Draco, in Base64: to decode it a worker must start. */
+const TRIANGLE =
+  "RFJBQ08CAgEAAAABAwEAAQIBAQAJAwAAAgABAQACAwFAAQDIAAAAAAABAAAAAAAAAAAAAAAAAAAAAACAPwE=";
+
+export interface TileDecoder {
+  readonly manager: LoadingManager;
+  /** Resolves when its first worker is starting, which takes as long as making a visit. */
+  readonly started: Promise<void>;
+}
+
+export function tileDecoder(files: Files): TileDecoder {
+  const manager = new LoadingManager();
+  const started = new Promise<void>((done) => {
+    manager.onLoad = done; // whether it came or not: tiles tell
+  });
+  const draco = new DRACOLoader(manager);
+  draco.setDecoderPath({
+    js: files.source(WRAPPER),
+    wasm: files.source(BINARY),
+  });
+  draco.parse(bytesOf(TRIANGLE), (triangle) => triangle.dispose());
+  manager.addHandler(/\.glb$/, new GLTFLoader(manager).setDRACOLoader(draco));
+  return { manager, started };
+}
+
+function bytesOf(base64: string): ArrayBuffer {
+  return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0)).buffer;
+}
