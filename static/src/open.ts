@@ -1,7 +1,7 @@
 /**
- * Lets the page stand, then opens the room that page and address say, or shows the plain page. The
- * poster is all that a visitor waits for: whatever the room needs is asked for after it, on a phone
- * when the page stands, which is read first there.
+ * Opens the room that page and address say, or shows the plain page. The poster is all that a
+ * visitor waits for, and stands first: whatever the room needs is asked for after it, on a phone
+ * when the whole page stands, which is read first there.
  */
 
 import { takeAlongInTime } from "./along/along.ts";
@@ -50,7 +50,7 @@ export async function open(
   const kiosk = host.dataset["kiosk"];
   keepIcon();
   const touched = touch();
-  const stands = quiet(host);
+  const stands = isTouch() ? quiet(host) : painted(host);
   if (!films && isTouch()) await Promise.race([touched, stands]);
   const coming = fetchTour(files);
   if (files.home) askAhead(host, files);
@@ -75,14 +75,15 @@ export async function open(
   const language = chooseLanguage(tour.languages, wishes);
   const spoken = bringWords(language);
   await Promise.race([touched, isTouch() && kiosk === undefined ? pause(READING_MS) : stands]);
-  if (!canDraw()) return give("noWebgl");
+  const canvas = drawable();
+  if (!canvas) return give("noWebgl");
   if (kiosk !== undefined) {
     const { openKiosk } = await import("./kiosk/open.ts");
-    return openKiosk(host, files, addresses, tour, room, kioskSettings(kiosk));
+    return openKiosk(host, canvas, files, addresses, tour, room, kioskSettings(kiosk));
   }
   const [{ Visit }] = await Promise.all([import("./visit.ts"), spoken]);
   const manner = { kiosk: false, language, opened: () => undefined, home: () => undefined };
-  const visit = await Visit.of(host, files, addresses, tour, room, manner);
+  const visit = await Visit.of(host, canvas, files, addresses, tour, room, manner);
   visit.start(found === null);
   if (files.home) takeAlongInTime(files.home, tour);
 }
@@ -102,20 +103,25 @@ function touch(): Promise<void> {
   });
 }
 
-/** Resolves when the page is loaded, its poster shown, and nothing else is to be done. */
+/** Resolves when the page is loaded, its poster on screen, and nothing else is to be done. */
 async function quiet(host: HTMLElement): Promise<void> {
   if (document.readyState !== "complete") {
     await new Promise((done) => window.addEventListener("load", done, { once: true }));
   }
-  await host.querySelector("img")?.decode().catch(() => undefined); // it shows no picture, then
-  const painted = new Promise((done) =>
-    new PerformanceObserver(done).observe({ type: "paint", buffered: true }),
-  );
-  await Promise.race([painted, pause(PATIENCE_MS)]);
-  // What was decoded is on screen two frames later at the latest.
-  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  await painted(host);
   if (!("requestIdleCallback" in window)) return; // Safari
   await new Promise((done) => requestIdleCallback(done, { timeout: PATIENCE_MS }));
+}
+
+/** Resolves when the poster is on screen. */
+async function painted(host: HTMLElement): Promise<void> {
+  await host.querySelector("img")?.decode().catch(() => undefined); // it shows no picture, then
+  const first = new Promise((done) =>
+    new PerformanceObserver(done).observe({ type: "paint", buffered: true }),
+  );
+  await Promise.race([first, pause(PATIENCE_MS)]);
+  // What was decoded is on screen two frames later at the latest.
+  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
 }
 
 /** Asks at once for all scripts that the visit consists of, as the page names them, and decoder. */
@@ -129,8 +135,10 @@ function askAhead(host: HTMLElement, files: Files): void {
   }
 }
 
-function canDraw(): boolean {
-  return document.createElement("canvas").getContext("webgl2") !== null;
+/** What the room is drawn on, made while its scripts come; null where nothing can be. */
+function drawable(): HTMLCanvasElement | null {
+  const canvas = element("canvas", { tabindex: "0", role: "application" });
+  return canvas.getContext("webgl2") && canvas;
 }
 
 /** Shows the page's own pictures and texts under a line that says why. */

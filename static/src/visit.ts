@@ -57,6 +57,7 @@ export class Visit {
   /** Makes a visit while what decodes its tiles starts. */
   static async of(
     host: HTMLElement,
+    canvas: HTMLCanvasElement,
     files: Files,
     addresses: Addresses,
     tour: Tour,
@@ -65,11 +66,12 @@ export class Visit {
   ): Promise<Visit> {
     const { manager, started } = tileDecoder(files);
     await started;
-    return new Visit(host, files, addresses, tour, room, manner, manager);
+    return new Visit(host, canvas, files, addresses, tour, room, manner, manager);
   }
 
   private constructor(
     host: HTMLElement,
+    canvas: HTMLCanvasElement,
     files: Files,
     addresses: Addresses,
     tour: Tour,
@@ -82,7 +84,7 @@ export class Visit {
     this.#manner = manner;
     const query = readQuery(location.search);
     const { kiosk, language } = manner;
-    const front = new Frontend(host, files, addresses, tour, room, language, kiosk, {
+    const front = new Frontend(host, canvas, files, addresses, tour, room, language, kiosk, {
       door: (link) => {
         this.#takeOver();
         this.#walking.walkThrough(link);
@@ -99,7 +101,7 @@ export class Visit {
       home: () => manner.home(),
     });
     this.front = front;
-    const stage = new Stage(front.canvas, query.background, (dt) => this.#frame(dt));
+    const stage = new Stage(canvas, query.background, (dt) => this.#frame(dt));
     this.#stage = stage;
     const rooms: Rooms = new Rooms(files, tour, room, stage, front, manager, query.levels, {
       expected: (view) => this.#walking.wait(view),

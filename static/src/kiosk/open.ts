@@ -10,6 +10,7 @@ import type { KioskSettings } from "./settings.ts";
 
 export async function openKiosk(
   host: HTMLElement,
+  canvas: HTMLCanvasElement,
   files: Files,
   addresses: Addresses,
   tour: Tour,
@@ -18,7 +19,7 @@ export async function openKiosk(
 ): Promise<void> {
   const [language = "en"] = tour.languages;
   await bringWords(...tour.languages); // any of them may be touched, and spoken at once
-  const visit: Visit = await Visit.of(host, files, addresses, tour, room, {
+  const visit: Visit = await Visit.of(host, canvas, files, addresses, tour, room, {
     kiosk: true,
     language,
     opened: (of) => kiosk.opened(of),

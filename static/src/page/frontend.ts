@@ -34,7 +34,7 @@ export interface FrontendEvents extends SignEvents {
 }
 
 export class Frontend {
-  readonly canvas = element("canvas", { tabindex: "0", role: "application" });
+  readonly canvas: HTMLCanvasElement;
   readonly spots = new Hotspots();
   readonly notice = new Notice();
   readonly cover: Cover;
@@ -59,6 +59,7 @@ export class Frontend {
 
   constructor(
     host: HTMLElement,
+    canvas: HTMLCanvasElement,
     files: Files,
     addresses: Addresses,
     tour: Tour,
@@ -68,6 +69,7 @@ export class Frontend {
     events: FrontendEvents,
   ) {
     this.#host = host;
+    this.canvas = canvas;
     this.#files = files;
     this.#addresses = addresses;
     this.#tour = tour;

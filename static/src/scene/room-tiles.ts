@@ -231,7 +231,8 @@ export class RoomTiles {
     this.#setSides(scene);
     if (tile.parent === null && !this.#rootShown) {
       this.#rootShown = true;
-      this.#events.root(colliderOf(scene));
+      // It is drawn while its walls are made ready.
+      requestAnimationFrame(() => setTimeout(() => this.#events.root(colliderOf(scene))));
     }
     this.#touch();
   }

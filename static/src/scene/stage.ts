@@ -172,8 +172,11 @@ export class Stage {
 
   #resize(): void {
     const ratio = Math.min(window.devicePixelRatio, PIXEL_RATIO_MAX) * this.#sharp;
-    this.renderer.setPixelRatio(ratio);
-    this.renderer.setSize(this.size.x, this.size.y, false);
+    const { x, y } = this.size;
+    const has = this.renderer.getSize(new Vector2()).equals(this.size);
+    // Being told anew, even the same, throws the picture away.
+    if (has && this.renderer.getPixelRatio() === ratio) return;
+    this.renderer.setDrawingBufferSize(x, y, ratio);
     this.#dirty = true;
   }
 }

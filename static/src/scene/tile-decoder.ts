@@ -10,6 +10,9 @@ import { BINARY, WRAPPER } from "./decoder.ts";
 const TRIANGLE =
   "RFJBQ08CAgEAAAABAwEAAQIBAQAJAwAAAgABAQACAwFAAQDIAAAAAAABAAAAAAAAAAAAAAAAAAAAAACAPwE=";
 
+/** That tiles after the first are shared out among. */
+const WORKERS = 4;
+
 export interface TileDecoder {
   readonly manager: LoadingManager;
   /** Resolves when its first worker is starting, which takes as long as making a visit. */
@@ -26,8 +29,12 @@ export function tileDecoder(files: Files): TileDecoder {
     js: files.source(WRAPPER),
     wasm: files.source(BINARY),
   });
+  draco.setWorkerLimit(1); // or the first tile would wait for another one to start
   draco.parse(bytesOf(TRIANGLE), (triangle) => triangle.dispose());
-  manager.addHandler(/\.glb$/, new GLTFLoader(manager).setDRACOLoader(draco));
+  const loader = new GLTFLoader(manager).setDRACOLoader(draco);
+  const afterRoot = async (): Promise<void> => void draco.setWorkerLimit(WORKERS);
+  loader.register(() => ({ name: "spread", afterRoot }));
+  manager.addHandler(/\.glb$/, loader);
   return { manager, started };
 }
 
