@@ -14,7 +14,7 @@ import pytest
 from imageio_ffmpeg import get_ffmpeg_exe
 from PIL import Image
 from scipy.ndimage import binary_dilation
-from visitor import Picture, psnr_db
+from visitor import Picture, Visit, psnr_db
 
 from tourgen.film.camera import Camera, open_camera
 from tourgen.film.settings import FilmSettings
@@ -132,6 +132,18 @@ def test_no_picture_lacks_a_tile_or_shows_the_void(site: Path) -> None:
         openings = binary_dilation(void(other), iterations=3)
         assert (void(one) & ~openings).sum() == 0, f"void at {second:.1f} s"
         assert psnr_db(one, other) > 25, f"coarse at {second:.1f} s"
+
+
+def test_walls_that_are_made_long_after_their_tile_came(visit: Visit) -> None:
+    """A page that waited for them without a pause would stand still for ever."""
+    here = visit()
+    here.page.add_init_script(
+        "const soon = window.requestAnimationFrame;"
+        "window.requestAnimationFrame = (draw) => setTimeout(() => soon(draw), 100);"
+    )
+    here.page.goto(f"{here.origin}/?film&levels=root")
+    here.wait("window.tourgen?.film")
+    here.wait("window.tourgen.film.plan().then(({ seconds }) => seconds > 10)")
 
 
 def picture(camera: Camera, second: float) -> Picture:

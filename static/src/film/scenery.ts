@@ -34,7 +34,10 @@ export class Scenery {
   /** Walls of a room, which takes the place of the one before. Throws where it does not come. */
   async enter(room: Room): Promise<Collider> {
     if (this.#room !== room) this.#change(room);
-    while (this.#collider === null) await this.#turn();
+    while (this.#collider === null) {
+      this.#update();
+      await pause(TURN_MS);
+    }
     return this.#collider;
   }
 
@@ -42,7 +45,11 @@ export class Scenery {
   async see(pose: Pose): Promise<void> {
     this.#aim(pose);
     this.#tiles?.moved();
-    while (this.#tiles?.busy || this.#tiles?.lacks) await this.#turn();
+    this.#update();
+    while (this.#tiles?.busy || this.#tiles?.lacks) {
+      await pause(TURN_MS);
+      this.#update();
+    }
   }
 
   #aim({ eye, ahead }: Pose): void {
@@ -52,12 +59,11 @@ export class Scenery {
     camera.updateMatrixWorld();
   }
 
-  async #turn(): Promise<void> {
+  #update(): void {
     if (this.#lost) {
       throw new Error(`room \`${this.#room?.id}\`: expected all of its tiles, found one missing`);
     }
     this.#tiles?.update(this.#stage.camera, this.#stage.size);
-    if (this.#tiles?.busy || this.#tiles?.lacks) await pause(TURN_MS);
   }
 
   #change(room: Room): void {
