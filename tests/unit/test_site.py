@@ -153,10 +153,12 @@ def viewer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dist = tmp_path / "dist"
     (dist / "draco-1").mkdir(parents=True)
     names = {"script": "viewer-1.js", "style": "style-1.css", "draco": "draco-1/"}
-    names_too = {"icon": "icon.svg", "soon": ["visit-1.js"], "kiosk": "kiosk-1.css"}
-    (dist / "manifest.json").write_text(json.dumps(names | names_too))
+    parts = {"first": ["parts-1.js"], "soon": ["parts-1.js", "visit-1.js"]}
+    names_too = {"icon": "icon.svg", "kiosk": "kiosk-1.css"}
+    (dist / "manifest.json").write_text(json.dumps(names | names_too | parts))
     for name in (
         "viewer-1.js",
+        "parts-1.js",
         "visit-1.js",
         "single.js",
         "style-1.css",
@@ -245,6 +247,15 @@ def test_pages_stand_without_script(tour: Tour, tmp_path: Path) -> None:
     start = (out / "index.html").read_text("utf-8")
     assert "<title>Light &amp; sea</title>" in start
     assert 'data-room="hall"' in start
+
+
+def test_a_phone_waits_with_the_scripts_of_a_visit(tour: Tour, tmp_path: Path) -> None:
+    write(tour, tmp_path / "site")
+    page = (tmp_path / "site/rooms/hall/index.html").read_text("utf-8")
+    asked = re.findall(r'"modulepreload" href="../../viewer/([^"]+)"([^>]*)>', page)
+    assert [name for name, _ in asked] == ["parts-1.js", "visit-1.js"]
+    assert ["media=" in how for _, how in asked] == [False, True]
+    assert 'media="not (pointer: coarse)"' in asked[1][1]
 
 
 def test_previews_and_search_engines_are_told_where_it_is(tour: Tour, tmp_path: Path) -> None:
