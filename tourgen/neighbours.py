@@ -26,7 +26,7 @@ _CELLS = _BRICK**3
 _MOST_BRICKS = 1 << 25
 _SHELLS = 4
 """Of cells; farther off, bricks are looked at as a whole."""
-_PART = 1 << 12
+_PART = 1 << 11
 _SAMPLE = 4096
 _FEW = 12
 """Neighbours for which cells are made at least: smaller ones take memory, and save nothing."""

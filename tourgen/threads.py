@@ -64,12 +64,14 @@ def each(job: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
 def in_parts(job: Callable[[int, int], object], count: int, part: int) -> None:
     """Run ``job(first, last)`` over 0 to ``count`` in parts, on this process's threads.
 
-    The first part goes alone, so that loops are compiled before threads meet in them.
+    One item goes alone, so that loops are compiled before threads meet in them.
     """
-    firsts = list(range(0, count, part))
-    alone = 1 if threads() > 1 else len(firsts)
-    for first in firsts[:alone]:
-        job(first, min(first + part, count))
-    if firsts[alone:]:
-        with ThreadPoolExecutor(threads()) as pool:
-            list(pool.map(lambda first: job(first, min(first + part, count)), firsts[alone:]))
+    alone = 1 if threads() > 1 else 0
+    if count <= part or not alone:
+        for first in range(0, count, part):
+            job(first, min(first + part, count))
+        return
+    job(0, alone)
+    with ThreadPoolExecutor(threads()) as pool:
+        firsts = [alone, *range(part, count, part)]
+        list(pool.map(job, firsts, [*firsts[1:], count]))

@@ -29,7 +29,7 @@ _HEM, _ROUND, _MIXED = np.float32(0.05), np.float32(1e-3), np.float32(0.12)
 share of them on its wrong side from which on it parts nothing."""
 _SPARE_STEPS = 0.1
 """How far a rim is thought to go on past that line, in their steps."""
-_PART = 1 << 12
+_PART = 1 << 11
 _VOID_STEPS = 2.5
 _SAMPLE = 20_000
 _ENOUGH = 3_000_000

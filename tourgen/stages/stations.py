@@ -16,6 +16,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from tourgen.geometry import Float32, Float64
+from tourgen.threads import each
 
 VERSION = 4
 _SECTORS = 8
@@ -121,7 +122,7 @@ def _discs(points: Float32, level_z: float, settings: Settings) -> Iterator[_Dis
     count = np.bincount(cell[:, 0] * shape[1] + cell[:, 1], minlength=shape.prod())
     density = np.log1p(gaussian_filter(count.reshape(shape).astype(float), 1.0))
     radii = np.arange(*settings.radius_m, settings.cell_m)
-    score = np.stack([_ring_response(density, radius / settings.cell_m) for radius in radii])
+    score = np.stack(each(lambda radius: _ring_response(density, radius / settings.cell_m), radii))
     # A table's leg answers the smallest radii, a wall the largest ones.
     score -= np.maximum(np.maximum(score[0], score[-1]), 0)
     x, y = np.ogrid[: shape[0], : shape[1]]

@@ -16,7 +16,7 @@ from tourgen.stages.surface.marching_cubes import Keys, corner_of, key_of
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.threads import in_parts
 
-_PART = 1 << 12
+_PART = 1 << 11
 _ACROSS = 0.1
 """Share of the weight across a crease from which on it is one."""
 _DENSEST, _SPARSEST = 0.5, 2.0

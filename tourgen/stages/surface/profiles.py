@@ -30,7 +30,7 @@ from tourgen.neighbours import Neighbours
 from tourgen.stages import tangent
 from tourgen.stages.surface.tangent_planes import Smoothing, TangentPlanes, tangent_planes
 from tourgen.symmetric import axes_of
-from tourgen.threads import in_parts
+from tourgen.threads import each, in_parts
 
 _PART = 1 << 14
 _COMPRESSED = np.float32(8.0)
@@ -84,11 +84,15 @@ def along_profiles(
     own, runs_on = _directions(planes.points[at], planes.normals[at])
     points, normals = planes.points.copy(), planes.normals.copy()
     best, support = planes.support + np.float32(_BETTER), planes.support.copy()
-    for way in _peaks(own[runs_on]):
+
+    def fit(way: Float32) -> tuple[Ints, TangentPlanes] | None:
         tried = at[runs_on & (np.abs(own @ way) > _ALONG)]
         if len(tried) < _LEAST:
-            continue
-        fitted = _fitted(raw[tried], planes.normals[tried], way, smoothing)
+            return None
+        return tried, _fitted(raw[tried], planes.normals[tried], way, smoothing)
+
+    for fit_found in filter(None, each(fit, _peaks(own[runs_on]))):
+        tried, fitted = fit_found
         turned = np.einsum("ij,ij->i", fitted.normals, planes.normals[tried])
         better = (fitted.support > best[tried]) & (turned > _TURNED)
         won = tried[better]

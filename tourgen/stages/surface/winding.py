@@ -32,7 +32,7 @@ _APART = 2
 """Levels of the tree above its leaves, on which is told what lies half way."""
 _MOST = 0.5
 """How far that may lie off its median."""
-_PART = 1 << 11
+_PART = 1 << 9
 _LEAST = 1e-12
 Keys = npt.NDArray[np.int64]
 
