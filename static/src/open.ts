@@ -15,6 +15,7 @@ import { askForRoom } from "./scene/prefetch.ts";
 import { fetchTour, roomCalled, startOf } from "./tour.ts";
 import { bringWords, chooseLanguage, SPOKEN, wordsIn } from "./words.ts";
 
+const LARGEST = "largest-contentful-paint";
 const PATIENCE_MS = 500;
 /** A phone that begins a room hears no finger for seconds: so long its page can be read before. */
 const READING_MS = 2500;
@@ -113,9 +114,29 @@ async function quiet(host: HTMLElement): Promise<void> {
   await new Promise((done) => requestIdleCallback(done, { timeout: PATIENCE_MS }));
 }
 
-/** Resolves when the poster is on screen. */
+/** Resolves when the poster is on screen: when the browser says so, or must have brought it there. */
 async function painted(host: HTMLElement): Promise<void> {
-  await host.querySelector("img")?.decode().catch(() => undefined); // it shows no picture, then
+  const poster = host.querySelector("img");
+  await Promise.race([told(poster), drawn(poster)]);
+}
+
+/** Resolves when the browser says that a picture, the largest of the page, is on screen. */
+function told(poster: HTMLImageElement | null): Promise<void> {
+  return new Promise((done) => {
+    if (!PerformanceObserver.supportedEntryTypes.includes(LARGEST)) return;
+    const watch = new PerformanceObserver((list) => {
+      const found = list.getEntries() as LargestContentfulPaint[];
+      if (!found.some(({ element }) => element !== null && element === poster)) return;
+      watch.disconnect();
+      done();
+    });
+    watch.observe({ type: LARGEST, buffered: true });
+  });
+}
+
+/** Resolves when a picture must be on screen. */
+async function drawn(poster: HTMLImageElement | null): Promise<void> {
+  await poster?.decode().catch(() => undefined); // it shows no picture, then
   const first = new Promise((done) =>
     new PerformanceObserver(done).observe({ type: "paint", buffered: true }),
   );

@@ -5,18 +5,22 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from published import rooms_of
-from visitor import ALONG, Visit, Visitor
+from visitor import ALONG, WAIT_S, Visit, Visitor
 
 from tourgen.site.offline import WORKER, worker_script
 from tourgen.site.pages import viewer_folder
 
-ROUNDS = 8
-"""Of looking for news. Three do, unless the machine is busy and the files take their time."""
+WORKERS = (
+    "navigator.serviceWorker.getRegistration().then((found) =>"
+    " [found?.installing, found?.waiting, found?.active].map((each) => each?.state))"
+)
+"""What the versions of a tour are at, for who has to find out why one did not come."""
 
 
 @contextmanager
@@ -106,13 +110,14 @@ def test_an_update_is_taken_over_whole_or_not_at_all(
         assert old in page.locator(".start-screen").inner_text()
 
         (here_folder / "tour.json").write_text(told.replace(old, "A new name"), "utf-8")
-        for _ in range(ROUNDS):  # looks for news, has it come, looks whether it waits
+        end = time.monotonic() + WAIT_S
+        while time.monotonic() < end:  # looks for news, has it come, looks whether it waits
             page.clock.run_for(65_000)
             page.wait_for_timeout(2500)
             here.wait("window.tourgen?.ready")
             if "A new name" in page.locator(".start-screen").inner_text():
                 break
-        assert "A new name" in page.locator(".start-screen").inner_text()
+        assert "A new name" in page.locator(".start-screen").inner_text(), page.evaluate(WORKERS)
         here.forgive("integrity", "bad-precaching-response", "Failed to fetch", "sha384")
 
 
