@@ -65,13 +65,15 @@ def in_parts(job: Callable[[int, int], object], count: int, part: int) -> None:
     """Run ``job(first, last)`` over 0 to ``count`` in parts, on this process's threads.
 
     One item goes alone, so that loops are compiled before threads meet in them.
+
+    Args:
+        part: Items of a part, at least 2.
     """
-    alone = 1 if threads() > 1 else 0
-    if count <= part or not alone:
+    if threads() == 1 or count <= part:
         for first in range(0, count, part):
             job(first, min(first + part, count))
         return
-    job(0, alone)
+    job(0, 1)
+    firsts = [1, *range(part, count, part)]
     with ThreadPoolExecutor(threads()) as pool:
-        firsts = [alone, *range(part, count, part)]
         list(pool.map(job, firsts, [*firsts[1:], count]))

@@ -126,7 +126,7 @@ function told(poster: HTMLImageElement | null): Promise<void> {
     if (!PerformanceObserver.supportedEntryTypes.includes(LARGEST)) return;
     const watch = new PerformanceObserver((list) => {
       const found = list.getEntries() as LargestContentfulPaint[];
-      if (!found.some(({ element }) => element !== null && element === poster)) return;
+      if (!poster || !found.some(({ element }) => element === poster)) return;
       watch.disconnect();
       done();
     });

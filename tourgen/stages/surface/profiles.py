@@ -91,8 +91,7 @@ def along_profiles(
             return None
         return tried, _fitted(raw[tried], planes.normals[tried], way, smoothing)
 
-    for fit_found in filter(None, each(fit, _peaks(own[runs_on]))):
-        tried, fitted = fit_found
+    for tried, fitted in filter(None, each(fit, _peaks(own[runs_on]))):
         turned = np.einsum("ij,ij->i", fitted.normals, planes.normals[tried])
         better = (fitted.support > best[tried]) & (turned > _TURNED)
         won = tried[better]
