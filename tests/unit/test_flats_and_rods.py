@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from tourgen.geometry import Mesh
-from tourgen.stages.surface.flats import flattened
+from tourgen.stages.surface.onto_flats import flattened
 from tourgen.stages.surface.rods import rods
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.stages.surface.tubes import Rod, with_tubes

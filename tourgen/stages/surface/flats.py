@@ -1,12 +1,8 @@
-"""Flats: walls, floors and boards are planes, and their tangent planes are told so.
+"""Flats: the planes of walls, floors and boards, grown over *surfels*.
 
-Tangent planes carry what is left of the noise: a wall drawn from them ripples by a few degrees, and
-the line where two walls meet wanders by millimetres. Where many of them agree on one plane, that
-plane is known far better than any of them is. So planes are grown over *surfels*, means of a few
-neighbouring tangent planes (region growing with refits: Poppinga, Vaskevicius, Birk and Pathak
-2008), and every tangent plane that lies on one within the noise is moved onto it and takes its
-normal. So do those beside a crease whose normals, fitted across it, look along neither side: that
-is what makes creases straight.
+A surfel is the mean of a few neighbouring tangent planes. From the calmest one on, those that hang
+together with it and lie on one plane are taken, and the plane is fitted anew (region growing with
+refits: Poppinga, Vaskevicius, Birk and Pathak 2008).
 
 What bends is no plane: a patch is refused where a paraboloid fits it better by more than the noise.
 """
@@ -14,18 +10,17 @@ What bends is no plane: a patch is refused where a paraboloid fits it better by 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from tourgen.compiled import compiled
-from tourgen.geometry import Float32, Float64, Int32
+from tourgen.geometry import Float64, Int32
 from tourgen.neighbours import Neighbours
 from tourgen.stages.mesh_arrays import components
 from tourgen.stages.surface.tangent_planes import TangentPlanes
 from tourgen.symmetric import axes_of
-from tourgen.threads import in_parts
 from tourgen.voxels import grouped, voxels
 
 _SURFEL = 2.5
@@ -38,29 +33,20 @@ _REACH = 2.2
 _ALIKE = np.cos(np.radians(9.0))
 _OFF = 1.6
 """How far off its plane a surfel may lie, in standard deviations of the points."""
-_POINT_OFF = 2.5
-"""The same for a tangent plane."""
-_TURNED = 0.5
-"""Cosine between a tangent plane's normal and that of the plane that it is moved onto, at least."""
 _LEAST_AREA_M2 = 0.004
 _LEAST_SURFELS = 6
-_BENT = 0.45
+BENT = 0.45
 """What a paraboloid may explain of a patch, root mean square, in standard deviations."""
-_WIDE_M = 1.0
-"""Standard deviation across of a flat of which heights tell enough, at least. From 0.25 or 0.6 on,
-panelled walls become flats that are none (chamber1, F-score at 5 mm: 0.971 instead of 0.976)."""
 _NARROW = 0.5
 """Standard deviation across of a strip's surfels, in their edges, at most."""
 _ROUNDS = 4
-_AROUND = 4
-_PART = 1 << 15
 
 Ints = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
-class _Surfels:
+class Surfels:
     """Means of neighbouring tangent planes.
 
     Attributes:
@@ -98,24 +84,14 @@ class Flats:
         return np.asarray((self.of >= 0) & ~np.append(self.narrow, True)[self.of])
 
 
-def flattened(planes: TangentPlanes, spacing_m: float) -> tuple[TangentPlanes, Flats]:
-    """Move the tangent planes that lie on a common plane onto it.
+def surfels_of(planes: TangentPlanes, spacing_m: float) -> Surfels:
+    """Mean tangent plane of each voxel and main direction of its normals.
 
     Args:
         planes: n tangent planes.
         spacing_m: Distance between neighbouring points in the middle of the room.
-
-    Returns:
-        The tangent planes, and the flats on which they lie.
     """
-    surfels = _surfels(planes, _SURFEL * spacing_m)
-    flats = _grown(surfels, planes.noise_m)
-    label = _straight(planes, np.append(flats.of, -1)[surfels.of], flats)[flats.of]
-    return _moved(planes, surfels, replace(flats, of=label))
-
-
-def _surfels(planes: TangentPlanes, edge_m: float) -> _Surfels:
-    """Mean tangent plane of each voxel and main direction of its normals."""
+    edge_m = _SURFEL * spacing_m
     axis = np.abs(planes.normals).argmax(axis=1)
     side = 2 * axis + (np.take_along_axis(planes.normals, axis[:, None], 1)[:, 0] > 0)
     order, starts = grouped(voxels(planes.points, edge_m)[0] * 6 + side)
@@ -129,11 +105,15 @@ def _surfels(planes: TangentPlanes, edge_m: float) -> _Surfels:
     length = np.linalg.norm(normal, axis=1)
     sound = (length > _COHERENT) & (count > 1)
     number = np.where(sound, np.cumsum(sound) - 1, -1)
-    return _Surfels(point[sound], normal[sound] / length[sound, None], edge_m, number[group])
+    return Surfels(point[sound], normal[sound] / length[sound, None], edge_m, number[group])
 
 
-def _grown(surfels: _Surfels, noise_m: float) -> Flats:
+def grown(surfels: Surfels, noise_m: float) -> Flats:
     """Grow planes, in each part of the surface that runs on without a crease for itself.
+
+    Args:
+        surfels: m of them.
+        noise_m: Standard deviation of the points along the surface's normal.
 
     Returns:
         The flats, with the surfels on them.
@@ -172,7 +152,7 @@ def _grown(surfels: _Surfels, noise_m: float) -> Flats:
     )
 
 
-def _neighbours(surfels: _Surfels, off_m: float) -> tuple[Ints, Ints, Float64]:
+def _neighbours(surfels: Surfels, off_m: float) -> tuple[Ints, Ints, Float64]:
     """Pairs of surfels that may be of one plane, sorted, and how much those of each differ."""
     points, normals = surfels.points, surfels.normals
     count = _NEIGHBOURS + 1
@@ -264,7 +244,7 @@ class _Region:
             if not _large(len(members), edge_m):
                 continue
             normal, offset = self._fitted(members)
-            if _bends(self.points[members], normal, offset, _BENT * noise_m):
+            if _bends(self.points[members], normal, offset, BENT * noise_m):
                 continue
             free[members] = False
             yield members, normal, offset
@@ -348,103 +328,3 @@ def _bends(points: Float64, normal: Float64, offset: float, most_m: float) -> bo
     terms = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=1)
     found = terms @ np.linalg.lstsq(terms, height, rcond=None)[0]
     return bool(np.sqrt(np.square(found).mean()) > most_m)
-
-
-def _straight(planes: TangentPlanes, label: Ints, flats: Flats) -> Ints:
-    """(p + 1,) number of each flat; -1 where its normals turn as a bent surface's would, and last.
-
-    A strip may be too narrow for its surfels' heights to tell. Across a room they tell best, and
-    the least that its normals are wrong together comes to millimetres: a floor of five metres, seen
-    in 15 million points, was none for that.
-
-    Args:
-        planes: n tangent planes.
-        label: (n,) the flat that each is of, -1 where of none.
-        flats: p of them.
-    """
-    own = np.flatnonzero(label >= 0)
-    label, count = label[own], len(flats.normals)
-    across = np.linalg.svd(flats.normals[:, None])[2][:, 1:].astype(np.float32)
-
-    def mean(values: Float32) -> Float64:
-        number = np.maximum(np.bincount(label, minlength=count), 1)
-        return np.asarray(np.bincount(label, values, minlength=count) / number)
-
-    def apart(values: Float32) -> Float32:
-        found = np.einsum("nij,nj->ni", across[label], values[own])
-        return np.asarray(found - np.stack([mean(each) for each in found.T], 1)[label], np.float32)
-
-    at, turn = apart(planes.points), apart(planes.normals)
-    spread = np.stack([[mean(x * y) for x in at.T] for y in at.T]).transpose(2, 0, 1)
-    turned = np.stack([[mean(x * y) for x in at.T] for y in turn.T]).transpose(2, 0, 1)
-    bend = turned @ np.linalg.pinv(spread)
-    height = np.einsum("ni,nij,nj->n", at, bend[label].astype(np.float32), at) / 2
-    height -= mean(height).astype(np.float32)[label]
-    wide = np.linalg.eigvalsh(spread)[:, 0] > _WIDE_M**2
-    bent = ~wide & (np.sqrt(mean(np.square(height))) > _BENT * planes.noise_m)
-    return np.append(np.where(bent, -1, np.arange(count)), -1)
-
-
-def _moved(planes: TangentPlanes, surfels: _Surfels, flats: Flats) -> tuple[TangentPlanes, Flats]:
-    """The tangent planes, those near a flat on it; the flats, with these instead of surfels."""
-    lain = np.flatnonzero(flats.of >= 0)
-    if not len(lain):
-        return planes, replace(flats, of=np.full(len(planes.points), -1))
-    around = Neighbours.of(surfels.points[lain], _AROUND)
-    near, _ = around.nearest(planes.points, _AROUND, 1.5 * surfels.edge_m)
-    label = np.append(flats.of[lain], -1).astype(np.int32)
-    chosen, height = _nearest(planes, flats, label[near])
-    on = np.flatnonzero(chosen >= 0)
-    points, normals, support = planes.points.copy(), planes.normals.copy(), planes.support.copy()
-    normals[on] = flats.normals[chosen[on]]
-    points[on] -= height[on, None] * normals[on]
-    support[on] = 1
-    moved = TangentPlanes(points, normals, planes.spacing_m, support, planes.noise_m)
-    return moved, replace(flats, of=chosen)
-
-
-def _nearest(planes: TangentPlanes, flats: Flats, label: Int32) -> tuple[Ints, Float32]:
-    """Which of a few flats each tangent plane lies on, -1 for none, and how high over it.
-
-    Args:
-        planes: n tangent planes.
-        flats: See there.
-        label: (n, k) numbers of the flats near each, -1 for none.
-    """
-    chosen, height = np.full(len(label), -1), np.zeros(len(label), np.float32)
-    normals, offsets_m = flats.normals.astype(np.float32), flats.offsets_m.astype(np.float32)
-    most_m = np.float32(_POINT_OFF * planes.noise_m)
-
-    def choose(first: int, last: int) -> None:
-        some = slice(first, last)
-        lying = planes.points[some], planes.normals[some], label[some]
-        _choose(normals, offsets_m, most_m, *lying, chosen[some], height[some])
-
-    in_parts(choose, len(label), _PART)
-    return chosen, height
-
-
-@compiled
-def _choose(
-    flat_normals: Float32,
-    offsets_m: Float32,
-    most_m: np.float32,
-    points: Float32,
-    normals: Float32,
-    label: Int32,
-    chosen: Ints,
-    height_m: Float32,
-) -> None:
-    """Write what ``_nearest`` tells of some tangent planes."""
-    for i in range(len(points)):
-        best = np.float32(np.inf)
-        for flat in label[i]:
-            if flat < 0:
-                continue
-            height, turned = -offsets_m[flat], np.float32(0)
-            for axis in range(3):
-                height += points[i, axis] * flat_normals[flat, axis]
-                turned += normals[i, axis] * flat_normals[flat, axis]
-            cost = abs(height) / most_m + 2 * (1 - turned)
-            if abs(height) < most_m and turned > _TURNED and cost < best:
-                best, chosen[i], height_m[i] = cost, flat, height

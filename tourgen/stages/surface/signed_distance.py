@@ -51,7 +51,6 @@ from tourgen.stages.free_space import FreeSpace
 from tourgen.stages.sift.strays import clusters
 from tourgen.stages.surface.blocks import drawn_by_blocks
 from tourgen.stages.surface.field import Beyond, Field
-from tourgen.stages.surface.flats import flattened
 from tourgen.stages.surface.growing import grown
 from tourgen.stages.surface.marching_cubes import (
     Keys,
@@ -60,6 +59,7 @@ from tourgen.stages.surface.marching_cubes import (
     most_cells,
 )
 from tourgen.stages.surface.meetings import met
+from tourgen.stages.surface.onto_flats import flattened
 from tourgen.stages.surface.profiles import along_profiles
 from tourgen.stages.surface.rods import rods
 from tourgen.stages.surface.samples import distinct_samples, require_range
