@@ -226,6 +226,24 @@ def test_walls_stop(site: Path, visit: Visit) -> None:
         assert abs(here.position[2] - start[2]) < 0.5
 
 
+def test_a_key_let_go_between_two_pictures_still_turns(visit: Visit) -> None:
+    """As a tap on a slow machine is."""
+    here = visit()
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.settle()
+    before = here.look
+    here.page.evaluate(
+        """for (const way of ["keydown", "keyup"]) {
+          window.dispatchEvent(new KeyboardEvent(way, { code: "ArrowLeft" }));
+        }"""
+    )
+    here.settle()
+    off = here.look - before
+    assert np.linalg.norm(off) > math.radians(1), before
+    here.page.wait_for_timeout(200)
+    np.testing.assert_array_equal(here.look, before + off)
+
+
 def test_click_on_the_floor_goes_there(site: Path, visit: Visit) -> None:
     here = visit(size=SIZE)
     here.open("rooms/chamber1/index.html")

@@ -26,6 +26,8 @@ export interface Wish {
 
 export class Keyboard {
   readonly #down = new Set<string>();
+  /** Let go since the last step: a slow machine takes none while a key is tapped. */
+  readonly #up = new Set<string>();
   #fast = false;
 
   /** @param wake Called when a key goes down that matters. */
@@ -36,15 +38,17 @@ export class Keyboard {
       if (keepsKeys(event.target, event.code)) return;
       event.preventDefault();
       this.#down.add(event.code);
+      this.#up.delete(event.code);
       wake();
     });
     target.addEventListener("keyup", (event) => {
       this.#fast = event.shiftKey;
-      this.#down.delete(event.code);
+      if (this.#down.has(event.code)) this.#up.add(event.code);
     });
     target.addEventListener("blur", () => this.#down.clear());
   }
 
+  /** What the keys ask for that are down, or were since the last time. */
   wish(): Wish {
     const wish: Wish = { ahead: 0, left: 0, turn: 0, up: 0, fast: this.#fast };
     for (const code of this.#down) {
@@ -54,6 +58,8 @@ export class Keyboard {
       wish.turn += turn;
       wish.up += up;
     }
+    for (const code of this.#up) this.#down.delete(code);
+    this.#up.clear();
     return wish;
   }
 }
