@@ -72,9 +72,10 @@ export async function open(
   const named = addresses.roomAt(new URL(location.href)) ?? host.dataset["room"] ?? null;
   const found = roomCalled(tour, named);
   const room = found ?? startOf(tour);
-  if (files.home) void askForRoom(files, room);
+  if (files.home) askForRoom(files, room);
   const language = chooseLanguage(tour.languages, wishes);
   const spoken = bringWords(language);
+  if (!isTouch() && kiosk === undefined) void prepare(files);
   await Promise.race([touched, isTouch() && kiosk === undefined ? pause(READING_MS) : stands]);
   const canvas = drawable();
   if (!canvas) return give("noWebgl");
@@ -117,13 +118,21 @@ async function quiet(host: HTMLElement): Promise<void> {
 /** Resolves when the poster is on screen: when the browser says so, or must have brought it there. */
 async function painted(host: HTMLElement): Promise<void> {
   const poster = host.querySelector("img");
-  await Promise.race([told(poster), drawn(poster)]);
+  if (!PerformanceObserver.supportedEntryTypes.includes(LARGEST)) return drawn(poster);
+  await Promise.race([told(poster), come(poster).then(() => pause(PATIENCE_MS))]);
+}
+
+/** Resolves when a picture has come, or never will. */
+function come(poster: HTMLImageElement | null): Promise<void> {
+  return new Promise((done) => {
+    if (!poster || poster.complete) return done();
+    for (const how of ["load", "error"]) poster.addEventListener(how, () => done(), { once: true });
+  });
 }
 
 /** Resolves when the browser says that a picture, the largest of the page, is on screen. */
 function told(poster: HTMLImageElement | null): Promise<void> {
   return new Promise((done) => {
-    if (!PerformanceObserver.supportedEntryTypes.includes(LARGEST)) return;
     const watch = new PerformanceObserver((list) => {
       const found = list.getEntries() as LargestContentfulPaint[];
       if (!poster || !found.some(({ element }) => element === poster)) return;
@@ -154,6 +163,12 @@ function askAhead(host: HTMLElement, files: Files): void {
   for (const path of [WRAPPER, BINARY]) {
     void files.fetch(files.locate(path), { priority: "low" }).catch(() => undefined); // asked again
   }
+}
+
+/** Has scripts and decoder ready when the poster stands; whoever needs them tells what fails. */
+async function prepare(files: Files): Promise<void> {
+  const visit = await import("./visit.ts").catch(() => null);
+  visit?.Visit.prepare(files);
 }
 
 /** What the room is drawn on, made while its scripts come; null where nothing can be. */

@@ -67,6 +67,8 @@ export interface Room {
   readonly title: Texts;
   readonly text: Texts;
   readonly tileset: string;
+  /** The tile that it is opened with. */
+  readonly root: string;
   readonly poster: string;
   readonly bounds: { readonly min: Triple; readonly max: Triple };
   readonly place: Place;

@@ -55,6 +55,11 @@ export class Visit {
   readonly #pointing: Pointing;
 
   /** Makes a visit while what decodes its tiles starts. */
+  /** Starts what a visit decodes with, before there is one. */
+  static prepare(files: Files): void {
+    tileDecoder(files);
+  }
+
   static async of(
     host: HTMLElement,
     canvas: HTMLCanvasElement,

@@ -166,6 +166,7 @@ def viewer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "sw.js",
         "icon.svg",
         "draco-1/draco_decoder.wasm",
+        "draco-1/draco_wasm_wrapper.js",
     ):
         (dist / name).write_text("x")
     monkeypatch.setattr(swap, "viewer_folder", lambda: dist)
@@ -256,6 +257,24 @@ def test_a_phone_waits_with_the_scripts_of_a_visit(tour: Tour, tmp_path: Path) -
     assert [name for name, _ in asked] == ["parts-1.js", "visit-1.js"]
     assert ["media=" in how for _, how in asked] == [False, True]
     assert 'media="not (pointer: coarse)"' in asked[1][1]
+
+
+def test_all_that_a_room_opens_with_is_asked_for_by_its_page(tour: Tour, tmp_path: Path) -> None:
+    """Before any script runs; on a phone not before one begins it."""
+    write(tour, tmp_path / "site")
+    page = (tmp_path / "site/rooms/hall/index.html").read_text("utf-8")
+    asked = re.findall(r'<link rel="preload" as="fetch" href="../../([^"]+)"([^>]*)>', page)
+    draco = "viewer/draco-1/"
+    assert [path for path, _ in asked] == [
+        "tour.json",
+        "rooms/hall/tileset.json",
+        f"{draco}draco_wasm_wrapper.js",
+        f"{draco}draco_decoder.wasm",
+        "rooms/hall/tiles/r.glb",
+    ]
+    assert {how for _, how in asked} == {
+        ' crossorigin fetchpriority="low" media="not (pointer: coarse)"'
+    }
 
 
 def test_previews_and_search_engines_are_told_where_it_is(tour: Tour, tmp_path: Path) -> None:

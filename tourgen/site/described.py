@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -84,6 +85,11 @@ def _note_files(room_id: str, number: int, note: Note) -> dict[str, tuple[str, s
 # ------------------------------------------------------------------ rooms
 
 
+def _root(built: BuiltRoom) -> str:
+    """Where the tile lies that a room is opened with."""
+    return str(json.loads(built.files["tileset.json"])["root"]["content"]["uri"])
+
+
 def _room(room: Room, built: BuiltRoom, place: Place, levels: Sequence[int], text: Json) -> Json:
     home = f"rooms/{room.id}"
     made = built.made
@@ -92,6 +98,7 @@ def _room(room: Room, built: BuiltRoom, place: Place, levels: Sequence[int], tex
         "title": dict(room.title),
         "text": text,
         "tileset": f"{home}/tileset.json",
+        "root": f"{home}/{_root(built)}",
         "poster": f"{home}/poster.webp",
         "preview": f"{home}/preview.jpg",
         "around": f"{home}/around.webp",

@@ -3,19 +3,13 @@
 import type { Files } from "../files.ts";
 import type { Room, Tour } from "../tour.ts";
 
-interface TilesetRoot {
-  readonly root: { readonly content?: { readonly uri: string } };
-}
-
 /** Asks for what a room is opened with, to be handed over; a failure is told when it is opened. */
-export async function askForRoom(files: Files, room: Room): Promise<void> {
-  const tileset = files.locate(room.tileset);
-  try {
-    const response = await files.ask(tileset);
-    const { root } = (await response.json()) as TilesetRoot;
-    if (root.content) await (await files.ask(new URL(root.content.uri, tileset))).body?.cancel();
-  } catch {
-    return;
+export function askForRoom(files: Files, room: Room): void {
+  for (const path of [room.tileset, room.root]) {
+    files
+      .ask(files.locate(path))
+      .then((response) => response.body?.cancel())
+      .catch(() => undefined);
   }
 }
 
@@ -44,13 +38,9 @@ export class Prefetch {
   async #room(room: Room): Promise<void> {
     try {
       new Image().src = this.#files.source(room.poster);
-      const tileset = this.#files.locate(room.tileset);
-      const response = await this.#files.fetch(tileset, { priority: "low" });
-      const { root } = (await response.json()) as TilesetRoot;
-      if (root.content) {
-        const at = new URL(root.content.uri, tileset);
-        const tile = await this.#files.fetch(at, { priority: "low" });
-        await tile.arrayBuffer();
+      for (const path of [room.tileset, room.root]) {
+        const response = await this.#files.fetch(this.#files.locate(path), { priority: "low" });
+        await response.arrayBuffer();
       }
     } catch {
       this.#done.delete(room.id);

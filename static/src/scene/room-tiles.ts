@@ -14,6 +14,7 @@ import {
   FrontSide,
   Mesh,
   MeshBasicMaterial,
+  NoColorSpace,
   Raycaster,
   type Group,
   type Intersection,
@@ -225,7 +226,10 @@ export class RoomTiles {
       object.name = tile.content?.uri ?? "";
     });
     for (const material of materialsOf(scene)) {
-      if (material.map) material.map.anisotropy = ANISOTROPY;
+      if (material.map) {
+        material.map.anisotropy = ANISOTROPY;
+        material.map.colorSpace = NoColorSpace; // see `Stage`
+      }
       tinted(material);
     }
     this.#setSides(scene);

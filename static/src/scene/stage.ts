@@ -2,6 +2,9 @@
 
 import {
   Color,
+  ColorManagement,
+  LinearSRGBColorSpace,
+  Mesh,
   PerspectiveCamera,
   Raycaster,
   Scene,
@@ -14,6 +17,10 @@ import { Sharpness } from "./sharpness.ts";
 
 /** What a step of the loop asks for: more steps because one moves, watches or waits, or none. */
 export type Pace = "moving" | "watching" | "waiting" | "still";
+
+// Light is baked into the textures and nothing adds to it: colours pass as they are. To have each
+// texel of each picture turned into linear light and back costs a third of a weak machine's time.
+ColorManagement.enabled = false;
 
 const PIXEL_RATIO_MAX = 2;
 /** A slow machine walks no slower down to four pictures a second. */
@@ -39,6 +46,7 @@ export class Stage {
   #isPaused = false;
   #before: number | null = null;
   #dirty = true;
+  #hasBegun = false;
 
   /**
    * @param canvas Where to draw.
@@ -48,6 +56,7 @@ export class Stage {
   constructor(canvas: HTMLCanvasElement, background: string, frame: (dt: number) => Pace) {
     this.#frame = frame;
     this.renderer = new WebGLRenderer({ canvas, antialias: true });
+    this.renderer.outputColorSpace = LinearSRGBColorSpace; // that is, as they are
     this.scene.background = new Color(background);
     this.camera.up.set(0, 0, 1);
     new ResizeObserver(() => this.#fit()).observe(canvas);
@@ -152,7 +161,9 @@ export class Stage {
     }
     if (this.#dirty) {
       this.#dirty = false;
-      this.render();
+      // Each picture of nothing takes time from the first of a room, and its poster stands before it.
+      this.#hasBegun ||= holdsMesh(this.scene);
+      if (this.#hasBegun) this.render();
     }
     this.#before = pace === "still" ? null : now;
     if (pace !== "still") this.wake();
@@ -186,4 +197,12 @@ export function uprightField(aspect: number): number {
   const across = Math.tan((ACROSS_MIN_DEG * Math.PI) / 360);
   const needed = (Math.atan(across / aspect) * 360) / Math.PI;
   return Math.min(UPRIGHT_MAX_DEG, Math.max(UPRIGHT_DEG, needed));
+}
+
+function holdsMesh(scene: Scene): boolean {
+  let holds = false;
+  scene.traverseVisible((object) => {
+    holds ||= object instanceof Mesh;
+  });
+  return holds;
 }

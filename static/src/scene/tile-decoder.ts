@@ -19,7 +19,13 @@ export interface TileDecoder {
   readonly started: Promise<void>;
 }
 
+let made: TileDecoder | null = null;
+
 export function tileDecoder(files: Files): TileDecoder {
+  return (made ??= startedDecoder(files));
+}
+
+function startedDecoder(files: Files): TileDecoder {
   const manager = new LoadingManager();
   const started = new Promise<void>((done) => {
     manager.onLoad = done; // whether it came or not: tiles tell

@@ -4,7 +4,7 @@ import type { MeshBasicMaterial } from "three";
 
 /** As the tiles' `_INFERRED` arrives: in small letters. */
 const ATTRIBUTE = "_inferred";
-const COLOR = "vec3(0.95, 0.42, 0.12)";
+const COLOR = "vec3(0.98, 0.68, 0.38)";
 const STRENGTH = 0.62;
 
 const strength = { value: 0 };
