@@ -49,8 +49,8 @@ packed by gltf-transform (Draco) and gltfpack (meshopt), both with WebP of the l
 picture is as near as tourgen's to that of the uncompressed room in the same viewer (`PSNR`).
 `whole`: until the room shows without a hole and {ALIKE_DB:.0f} dB like its own sharp picture; what
 tourgen's poster shows does not count. `sharp`: until nothing is missing in the first view. Medians
-of {TIMES}, from the same place in the room; KB of all that came by then, scripts too. Asked: half
-the time and half the bytes of each other until whole, and fewer bytes when sharp.
+of {TIMES}, loaded in turn, from the same place in the room; KB of all that came by then, scripts
+too. Asked: half the time and half the bytes of each other until whole, and fewer bytes when sharp.
 """
 
 
