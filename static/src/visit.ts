@@ -54,12 +54,12 @@ export class Visit {
   readonly #tools: Tools;
   readonly #pointing: Pointing;
 
-  /** Makes a visit while what decodes its tiles starts. */
   /** Starts what a visit decodes with, before there is one. */
   static prepare(files: Files): void {
     tileDecoder(files);
   }
 
+  /** Makes a visit while what decodes its tiles starts. */
   static async of(
     host: HTMLElement,
     canvas: HTMLCanvasElement,

@@ -21,6 +21,7 @@ export interface TileDecoder {
 
 let made: TileDecoder | null = null;
 
+/** Started by whoever asks first, for all. */
 export function tileDecoder(files: Files): TileDecoder {
   return (made ??= startedDecoder(files));
 }
