@@ -277,6 +277,17 @@ def test_all_that_a_room_opens_with_is_asked_for_by_its_page(tour: Tour, tmp_pat
     }
 
 
+def test_a_poster_that_has_come_stands_in_the_first_picture_of_its_page(
+    tour: Tour, tmp_path: Path
+) -> None:
+    write(tour, tmp_path / "site")
+    for name in ("index.html", "kiosk.html", "rooms/hall/index.html"):
+        page = (tmp_path / "site" / name).read_text("utf-8")
+        (poster,) = re.findall(r'<section id="tour".*?<img ([^>]*)>', page, re.DOTALL)
+        assert "poster.webp" in poster
+        assert 'decoding="sync"' in poster, name
+
+
 def test_previews_and_search_engines_are_told_where_it_is(tour: Tour, tmp_path: Path) -> None:
     out = tmp_path / "site"
     write(tour.model_copy(update={"address": "https://example.org/tour/"}), out)
