@@ -206,6 +206,25 @@ def test_round_of_all_rooms(site: Path, visit: Visit) -> None:
     assert_arrived(here, door)
 
 
+@pytest.mark.parametrize("press", [mouse, finger])
+def test_a_drag_that_begins_on_a_sign_turns_and_opens_nothing(
+    site: Path, visit: Visit, press: Any
+) -> None:
+    here = visit(size=SIZE, has_touch=True)
+    here.open("rooms/chamber1/index.html")
+    here.teleport(here.position, link(site, "chamber1", "chamber2")["at"])
+    here.page.locator(".door[data-to=chamber2]:not(.away)").wait_for()
+    assert here.page.evaluate(
+        "([x, y]) => document.elementFromPoint(x, y).closest('.door') !== null", MIDDLE
+    )
+    look = here.look
+    with press(here) as move:
+        move(DRAG_PX / 2, 0)
+    here.settle()
+    assert off_by(here, here.position + look) < -0.2
+    assert here.room == "chamber1"
+
+
 def test_walls_stop(site: Path, visit: Visit) -> None:
     """Whichever way one runs from the middle of a room, one stays inside it."""
     room = rooms_of(site)["chamber2"]

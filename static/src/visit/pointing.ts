@@ -35,7 +35,7 @@ export class Pointing {
   constructor(host: PointingHost) {
     this.#host = host;
     host.stage.scene.add(this.#marker.group);
-    this.#pointer = new Pointer(host.front.canvas, {
+    this.#pointer = new Pointer(host.front.canvas, host.front.spots.element, {
       look: (dx, dy) => this.#turn(dx, dy),
       click: (x, y) => this.#click(x, y),
       hover: (x, y) => this.#hover(x, y),

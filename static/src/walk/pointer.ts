@@ -30,16 +30,29 @@ interface Finger {
 export class Pointer {
   readonly #fingers = new Map<number, Finger>();
   readonly #events: PointerEvents;
+  readonly #canvas: HTMLElement;
   #anchor: readonly [number, number] | null = null;
+  /** Pressed on a sign: a click of that sign, unless it moves. */
+  #onSign: PointerEvent | null = null;
 
-  constructor(canvas: HTMLElement, events: PointerEvents) {
+  /** @param signs What hangs over the picture: whoever begins a drag there turns, too. */
+  constructor(canvas: HTMLElement, signs: HTMLElement, events: PointerEvents) {
+    this.#canvas = canvas;
     this.#events = events;
     canvas.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0) return;
-      canvas.setPointerCapture(event.pointerId);
-      this.#press(event);
+      if (event.button === 0) this.#press(event);
     });
-    canvas.addEventListener("pointermove", (event) => this.#move(event));
+    signs.addEventListener("pointerdown", (event) => {
+      this.#onSign = event.button === 0 ? event : null;
+    });
+    signs.addEventListener("pointermove", (event) => this.#drawOff(event));
+    for (const kind of ["pointerup", "pointercancel"]) {
+      signs.addEventListener(kind, () => (this.#onSign = null));
+    }
+    canvas.addEventListener("pointermove", (event) => {
+      this.#drawOff(event);
+      this.#move(event);
+    });
     canvas.addEventListener("pointerup", (event) => this.#release(event, true));
     canvas.addEventListener("pointercancel", (event) => this.#release(event, false));
     canvas.addEventListener("pointerleave", () => events.leave());
@@ -57,12 +70,26 @@ export class Pointer {
     return this.#fingers.size > 0;
   }
 
+  /** A press on a sign that moves is one on the picture, and opens nothing. */
+  #drawOff(event: PointerEvent): void {
+    const press = this.#onSign;
+    if (press?.pointerId !== event.pointerId) return;
+    if (event.buttons === 0) this.#onSign = null;
+    else if (Math.hypot(event.x - press.x, event.y - press.y) > CLICK_SLOP_PX) {
+      this.#onSign = null;
+      this.#press(press);
+    }
+  }
+
   #press(event: PointerEvent): void {
+    this.#canvas.setPointerCapture(event.pointerId);
+    const frame = this.#canvas.getBoundingClientRect();
+    const [x, y] = [event.x - frame.left, event.y - frame.top];
     this.#fingers.set(event.pointerId, {
-      x: event.offsetX,
-      y: event.offsetY,
-      startX: event.offsetX,
-      startY: event.offsetY,
+      x,
+      y,
+      startX: x,
+      startY: y,
       since: event.timeStamp,
       moved: this.#fingers.size > 0,
     });
