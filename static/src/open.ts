@@ -15,7 +15,6 @@ import { askForRoom } from "./scene/prefetch.ts";
 import { fetchTour, roomCalled, startOf } from "./tour.ts";
 import { bringWords, chooseLanguage, SPOKEN, wordsIn } from "./words.ts";
 
-const LARGEST = "largest-contentful-paint";
 const PATIENCE_MS = 500;
 /** A phone that begins a room hears no finger for seconds: so long its page can be read before. */
 const READING_MS = 2500;
@@ -115,11 +114,14 @@ async function quiet(host: HTMLElement): Promise<void> {
   await new Promise((done) => requestIdleCallback(done, { timeout: PATIENCE_MS }));
 }
 
-/** Resolves when the poster is on screen: when the browser says so, or must have brought it there. */
+/**
+ * Resolves when the poster is drawn. It is decoded with the page's picture (`decoding="sync"`): the
+ * first from here on holds it, and by the second it has left the page's hands.
+ */
 async function painted(host: HTMLElement): Promise<void> {
-  const poster = host.querySelector("img");
-  if (!PerformanceObserver.supportedEntryTypes.includes(LARGEST)) return drawn(poster);
-  await Promise.race([told(poster), come(poster).then(() => pause(PATIENCE_MS))]);
+  await come(host.querySelector("img"));
+  const drawn = new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  await Promise.race([drawn, pause(PATIENCE_MS)]); // there are no pictures of a page that is hidden
 }
 
 /** Resolves when a picture has come, or never will. */
@@ -128,30 +130,6 @@ function come(poster: HTMLImageElement | null): Promise<void> {
     if (!poster || poster.complete) return done();
     for (const how of ["load", "error"]) poster.addEventListener(how, () => done(), { once: true });
   });
-}
-
-/** Resolves when the browser says that a picture, the largest of the page, is on screen. */
-function told(poster: HTMLImageElement | null): Promise<void> {
-  return new Promise((done) => {
-    const watch = new PerformanceObserver((list) => {
-      const found = list.getEntries() as LargestContentfulPaint[];
-      if (!poster || !found.some(({ element }) => element === poster)) return;
-      watch.disconnect();
-      done();
-    });
-    watch.observe({ type: LARGEST, buffered: true });
-  });
-}
-
-/** Resolves when a picture must be on screen. */
-async function drawn(poster: HTMLImageElement | null): Promise<void> {
-  await poster?.decode().catch(() => undefined); // it shows no picture, then
-  const first = new Promise((done) =>
-    new PerformanceObserver(done).observe({ type: "paint", buffered: true }),
-  );
-  await Promise.race([first, pause(PATIENCE_MS)]);
-  // What was decoded is on screen two frames later at the latest.
-  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
 }
 
 /** Asks at once for all scripts that the visit consists of, as the page names them, and decoder. */

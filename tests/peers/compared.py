@@ -28,10 +28,19 @@ OURS = "tourgen"
 SETTLED = "window.tourgen?.idle"
 BARE = """
 const sheet = new CSSStyleSheet();
-sheet.replaceSync('#tour > :not(canvas), .cover { opacity: 0.004 !important }');
+sheet.replaceSync(`
+  #tour > img, .cover { opacity: 0.004 !important }
+  #tour > :not(canvas, img, .cover), #tour > :not(canvas, img, .cover) * {
+    visibility: hidden !important;
+  }
+`);
 document.adoptedStyleSheets = [sheet];
 """
-"""The room itself is judged, not its poster, which is far sooner there."""
+"""The room itself is judged, not its poster, which is far sooner there, nor what lies before it.
+
+The poster is there nonetheless, since the room waits for it. The page draws the room no sooner than
+with all of it shown.
+"""
 
 
 @dataclass(frozen=True)

@@ -133,6 +133,9 @@ export class RoomTiles {
     this.#stale = false;
     this.#tiles.setResolution(camera, size);
     this.#tiles.update();
+    for (const queue of this.#tiles.downloadQueue.originQueues.values()) {
+      queue.tryRunJobs(); // or they would wait for the next picture
+    }
     const { root } = this.#tiles;
     if (!root || !this.#rootShown) return;
     this.#tiles.lruCache.markUsed(root); // it stands in at any time
