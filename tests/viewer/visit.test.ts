@@ -105,6 +105,15 @@ test("a glide goes from here to there, never faster than on foot at twice the pa
   assert.ok(steps > 120 && steps < 1200);
 });
 
+test("a glide is on its way in its last millionth, too", () => {
+  const goal = vector(3, 0, 1.6);
+  const glide = new Glide([vector(0, 0, 1.6), goal], vector(1, 0, 0), vector(3, 6, 1));
+  for (let left = 0; left < 1e-5; left += 1e-8) {
+    glide.at(glide.seconds * (1 - left));
+    near(glide.eye, goal, 1e-6);
+  }
+});
+
 test("a glide to where one is turns the head, straight back too", () => {
   const here = vector(0, 0, 1.6);
   const glide = new Glide([here, here], vector(1, 0, 0), vector(-5, 0, 1.6));

@@ -91,5 +91,5 @@ export function toward(direction: Vector3, other: Vector3, part: number): void {
 /** From 0 to 1 with no jerk at either end. */
 export function ease(part: number): number {
   const t = Math.min(1, Math.max(0, part));
-  return t * t * t * (t * (6 * t - 15) + 10);
+  return Math.min(1, t * t * t * (t * (6 * t - 15) + 10)); // rounded, it is more in the last millionth
 }

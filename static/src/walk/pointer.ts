@@ -40,6 +40,7 @@ export class Pointer {
     this.#canvas = canvas;
     this.#events = events;
     canvas.addEventListener("pointerdown", (event) => {
+      if (this.#onSign?.pointerId === event.pointerId) this.#onSign = null; // its sign went with a room
       if (event.button === 0) this.#press(event);
     });
     signs.addEventListener("pointerdown", (event) => {
