@@ -72,7 +72,9 @@ class Visitor:
     def __post_init__(self) -> None:
         self.page.set_default_timeout(WAIT_S * 1000)
         self.page.on("console", self._heard)
-        self.page.on("pageerror", lambda error: self.faults.append(f"exception: {error.stack}"))
+        self.page.on(
+            "pageerror", lambda error: self.faults.append(f"exception: {error.stack or error}")
+        )
         self.page.on("request", self._asked)
         self.page.on("requestfailed", self._failed)
         self.page.on("response", self._answered)
