@@ -11,6 +11,8 @@ NPM := PATH="$(CURDIR)/$(BIN):$$PATH" npm
 .PHONY: help
 help:
 	@echo "make demo        scan the modelled lighthouse and build its tour (FULL=1: every point)"
+	@echo "make install     what tourgen needs, and .venv/bin/tourgen"
+	@echo "make viewer      compile what visitors' browsers run"
 	@echo "make test        every test but the benches"
 	@echo "make lint        ruff, mypy and the viewer's types"
 	@echo "make bench       accuracy of the demo against its ground truth"

@@ -7,6 +7,7 @@ import errno
 import json
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from tourgen.errors import Faults, InputError, StageError, TourgenError
 from tourgen.threads import limit_native_threads
 
 OUTPUT = "site"
+_LAST_PORT = 65535
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -70,6 +72,7 @@ def _parser() -> argparse.ArgumentParser:
         return command
 
     add("new", _new, "Write a commented tour.toml for the scans found in DIR.", "DIR")
+    add("keys", _keys, "Tell what each key of tour.toml means.", "")
     check = add("check", _check, "Read tour.toml and the scans' headers; tell every fault.", "DIR")
     plan = add("plan", _plan, "Say what a build would do, and why.", "DIR")
     build = add("build", _build, "Build the tour's website.", "DIR")
@@ -82,10 +85,14 @@ def _parser() -> argparse.ArgumentParser:
         "-o", "--output", metavar="OUT", help="the site's folder (DIR/site), or an address"
     )
     build.add_argument(
-        "--room", action="append", default=[], metavar="ID", help="build only this room; repeatable"
+        "--room",
+        action="append",
+        default=[],
+        metavar="ID",
+        help="build only this room, with the others as they were built before; repeatable",
     )
     build.add_argument(
-        "--jobs", type=_positive, metavar="N", help="stages that run at once (one a core)"
+        "--jobs", type=_whole(), metavar="N", help="stages that run at once (one a core)"
     )
     build.add_argument(
         "--cluster", metavar="ADDRESS", help="run them on the workers of this dask scheduler"
@@ -102,8 +109,8 @@ def _parser() -> argparse.ArgumentParser:
         help="besides, one HTML file of the tour and one of each room, which hold all they show "
         "and open by a double click",
     )
-    serve.add_argument("--port", type=_positive, default=8000, help="port (8000)")
-    kiosk.add_argument("--port", type=_positive, default=8710, help="port (8710)")
+    serve.add_argument("--port", type=_whole(_LAST_PORT), default=8000, help="port (8000)")
+    kiosk.add_argument("--port", type=_whole(_LAST_PORT), default=8710, help="port (8710)")
     film.add_argument(
         "-o",
         "--output",
@@ -130,11 +137,16 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"expected at least 1, found {number}")
-    return number
+def _whole(most: int | None = None) -> Callable[[str], int]:
+    """Reads a whole number from 1 on, and up to ``most`` where that is given."""
+    expected = f"a whole number from 1 to {most}" if most else "a whole number, at least 1"
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or not 1 <= int(text) <= (most or sys.maxsize):
+            raise argparse.ArgumentTypeError(f"expected {expected}, found {text}")
+        return int(text)
+
+    return read
 
 
 def _rooms(count: int) -> str:
@@ -153,7 +165,14 @@ def _new(asked: argparse.Namespace) -> int:
     if target.exists():
         raise InputError(f"`{target}`: expected no file, found one", "edit it, or move it away")
     target.write_text(starter(asked.folder), encoding="utf-8")
-    print(f"wrote {target}; now: tourgen build {asked.folder}")
+    print(f"wrote {target}; now: tourgen check {asked.folder}")
+    return 0
+
+
+def _keys(_: argparse.Namespace) -> int:
+    from tourgen.reference import reference
+
+    print(reference(), end="")
     return 0
 
 
@@ -301,7 +320,10 @@ def _clean(asked: argparse.Namespace) -> int:
     from tourgen.tour import TOUR_FILE
 
     if not (asked.folder / TOUR_FILE).is_file():
-        raise InputError(f"`{asked.folder}`: expected a folder with a {TOUR_FILE}, found none")
+        raise InputError(
+            f"`{asked.folder}`: expected a folder with a {TOUR_FILE}, found none",
+            "name the folder that `tourgen build` was given",
+        )
     freed = Cache(asked.folder).clear()
     print(f"dropped the cache of {asked.folder}: {freed / 1e6:.1f} MB")
     return 0
@@ -312,12 +334,12 @@ def _doctor(asked: argparse.Namespace) -> int:
 
     found = findings(Path.cwd())
     if asked.json:
-        _print_json([{"subject": f.subject, "fault": f.fault, "mend": f.mend} for f in found])
+        _print_json([asdict(finding) for finding in found])
     elif not found:
         print("nothing is lacking")
     for each in [] if asked.json else found:
         print(f"{each.subject}: {each.fault}\n\nhint: {each.mend}\n")
-    return 1 if found else 0
+    return 1 if any(not each.optional for each in found) else 0
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ BENCH_LIBRARIES = {
 """What ``import pymeshlab`` loads besides, for the benches."""
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-"""Programs that can draw a tour for the tests, the best known first."""
+"""Programs that show a tour on a kiosk, and draw it for a film, the best known first."""
 
 TEST_PROGRAMS = {"firefox-esr": "firefox-esr", "Xvfb": "xvfb", "xdotool": "xdotool"}
 """Programs that the tests run beside Chromium, and the Debian package of each: the other browser,
@@ -53,12 +53,14 @@ class Finding:
         fault: What was expected and what was found.
         mend: The line that mends it, to be typed or to be followed.
         package: The Debian package that would bring it, "" where none does.
+        optional: Whether a tour is built and served without it.
     """
 
     subject: str
     fault: str
     mend: str
     package: str = ""
+    optional: bool = False
 
 
 def findings(folder: Path, *, tests: bool = False, bench: bool = False) -> list[Finding]:
@@ -75,15 +77,11 @@ def findings(folder: Path, *, tests: bool = False, bench: bool = False) -> list[
     found = [*_libraries(LIBRARIES, "Open3D"), *_disk(folder), *_memory()]
     if bench:
         found += _libraries(BENCH_LIBRARIES, "PyMeshLab")
-    if tests and browser() is None:
-        found.append(
-            Finding(
-                "chromium",
-                "needed by the browser tests, not found on the path",
-                _install_line("chromium", of="chromium"),
-                package="chromium",
-            )
-        )
+    if browser() is None:
+        by = "the browser tests" if tests else "`tourgen kiosk` and `tourgen film` alone"
+        fault = f"needed by {by}, not found on the path"
+        mend = _install_line("chromium", of="chromium")
+        found.append(Finding("chromium", fault, mend, "chromium", optional=not tests))
     if tests:
         found += _programs(TEST_PROGRAMS)
     return found
@@ -141,4 +139,4 @@ def _gib(size: int) -> str:
 
 if __name__ == "__main__":
     lacking = findings(Path.cwd(), tests="--tests" in sys.argv, bench="--bench" in sys.argv)
-    print(*(finding.package for finding in lacking if finding.package))
+    print(*(finding.package for finding in lacking if finding.package and not finding.optional))

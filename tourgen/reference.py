@@ -162,7 +162,7 @@ def starter(folder: Path) -> str:
             f"copy them to `{folder / 'scans'}`",
         )
     lines = [
-        "# What each key means: docs/tour-file.md. Lines that start with # are not read;",
+        "# What each key means: run `tourgen keys`. Lines that start with # are not read;",
         "# those with a key show what holds as long as they are left out.",
         "",
         "[tour]",

@@ -56,7 +56,9 @@ def fetch(folder: Path, name: str) -> None:
     with _told(name):
         storage, path = _storage(name)
         if not storage.exists(path):
-            raise InputError(f"expected a file, found none at `{name}`")
+            raise InputError(
+                f"expected a file, found none at `{name}`", "look at its address in tour.toml"
+            )
         state = str(storage.ukey(path))
         if target.exists() and note.exists() and note.read_text("utf-8") == state:
             return

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from tourgen.cli import main
 from tourgen.errors import InputError, StageError
 from tourgen.headers import SECURITY_HEADERS, headers_file
 from tourgen.serve import TourServer, open_server
@@ -228,3 +229,14 @@ def test_serves_nothing_but_tours(tmp_path: Path) -> None:
     (tmp_path / "letter.txt").write_text("dear")
     with pytest.raises(InputError, match="expected a tour"):
         open_server(tmp_path, port=0)
+
+
+@pytest.mark.parametrize("port", ["0", "70000", "abc", "-1", "8000.5"])
+def test_what_is_no_port_is_refused_in_a_line(
+    folder: Path, port: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["serve", str(folder), f"--port={port}"])
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert f"--port: expected a whole number from 1 to 65535, found {port}" in said

@@ -42,7 +42,7 @@ def test_colours_font_and_logo_are_published(tmp_path: Path) -> None:
         ('akcent = "#e9c46a"', "theme.toml: akcent: unknown key"),
         ('logo = "logo.svg"', "theme.toml: logo: expected a file, found none at `logo.svg`"),
         ('scheme = "blue"', "theme.toml: scheme: expected one of auto, light, dark"),
-        ("accent = ", "theme.toml: expected TOML"),
+        ("accent = gold", "theme.toml: line 1, column 10: expected TOML"),
     ],
 )
 def test_what_is_wrong_is_told(tmp_path: Path, text: str, said: str) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scan_files import cloud_table, write_ply
 
+from tourgen.cli import main
 from tourgen.errors import Faults, InputError
 from tourgen.reference import reference, starter
 from tourgen.tour import Room, check_scans, load_tour, open_scans
@@ -410,7 +411,7 @@ def test_a_room_id_must_serve_as_folder_and_address(folder, room_id):
 
 def test_a_room_without_an_id_is_told_by_its_number(folder):
     told = faults(folder, '[tour]\ntitle = "T"\n[[room]]\nscans = ["scans/a.ply"]\n')
-    assert told == [("room 1: id: expected this key, found none", "")]
+    assert told == [("room 1: id: expected this key, found none", "write `id = …`")]
 
 
 def test_languages_must_be_codes_each_once(folder):
@@ -423,8 +424,9 @@ def test_languages_must_be_codes_each_once(folder):
 
 
 def test_what_is_no_toml_is_told_with_its_line(folder):
-    ((said, _),) = faults(folder, '[tour]\ntitle = "T\n')
+    ((said, hint),) = faults(folder, '[tour]\ntitle = "T\n')
     assert said.startswith("line 2, column 11: expected TOML, found: ")
+    assert "straight quotes" in hint
     ((said, _),) = faults(folder, '[tour]\ntitle = "T"\ntitle = "U"\n')
     assert said.startswith("line 3, column 12: expected TOML, found: cannot overwrite a value")
     ((said, _),) = faults(folder, "x = [1,")
@@ -440,9 +442,9 @@ def test_a_file_that_is_no_utf_8_is_told(folder):
 def test_a_missing_tour_file_and_an_empty_one_are_told(folder):
     with pytest.raises(Faults, match=r"tour.toml: expected a file in .*, found none"):
         load_tour(folder)
-    assert [said for said, _ in faults(folder, "")] == [
-        "tour: expected this key, found none",
-        "room: expected this key, found none",
+    assert faults(folder, "") == [
+        ("tour: expected this key, found none", "write `[tour]`, and its keys below"),
+        ("room: expected this key, found none", "write `[[room]]`, and its keys below"),
     ]
 
 
@@ -520,3 +522,8 @@ def test_every_key_is_described_and_the_page_is_current():
     for name, info in Room.model_fields.items():
         assert info.description, name
         assert f"`{info.alias or name}`" in page
+
+
+def test_what_keys_mean_is_told_by_a_command(capsys):
+    assert main(["keys"]) == 0
+    assert capsys.readouterr().out == reference()

@@ -139,7 +139,8 @@ def _frames(plan: Json, settings: FilmSettings) -> tuple[int, int]:
     first, last = (round(second * settings.fps) for second in settings.part)
     if first >= min(last, count):
         raise InputError(
-            f"--part: expected frames within the film's {plan['seconds']:.0f} s, found none"
+            f"--part: expected frames within the film's {plan['seconds']:.0f} s, found none",
+            "choose seconds that it has, as `--part 0-3`",
         )
     return first, min(last, count)
 

@@ -186,7 +186,8 @@ def _aimed(page: Page, address: str) -> _Shown:
             )
         if time.monotonic() > end:
             raise StageError(
-                f"film: expected the viewer to open, found it waiting {_OPENS_S:.0f} s"
+                f"film: expected the viewer to open, found it waiting {_OPENS_S:.0f} s",
+                "run the same line again when the machine has less to do",
             )
         page.wait_for_timeout(_LOOKS_EVERY_S * 1000)
     plan = page.evaluate("window.tourgen.film.plan()")

@@ -72,7 +72,9 @@ def _open_format(path: Path) -> Source:
     open_format = FORMATS.get(path.suffix.lower())
     if open_format is None:
         known = ", ".join(FORMATS)
-        raise InputError(f"expected a name ending in {known}, found `{path.name}`")
+        raise InputError(
+            f"expected a name ending in {known}, found `{path.name}`", "export it in one of these"
+        )
     try:
         if path.stat().st_size == 0:
             raise InputError("expected points, found an empty file", "export it again")

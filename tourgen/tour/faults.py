@@ -6,7 +6,7 @@ import difflib
 import re
 import types
 from collections.abc import Iterator, Mapping
-from typing import Any, Final, get_args
+from typing import Any, Final, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -93,13 +93,22 @@ def _subject(location: Location, data: Mapping[str, Any]) -> str:
     return ": ".join([*parts, joined] if joined else parts)
 
 
+def _written(location: tuple[int | str, ...], model: type[BaseModel]) -> str:
+    """How a key at a place stands in the file: as a table, one of several, or with its value."""
+    key = str(location[-1])
+    if len(location) > 1:
+        return f"`{key} = …`"
+    is_list = get_origin(model.model_fields[key].annotation) is tuple
+    return f"`[[{key}]]`, and its keys below" if is_list else f"`[{key}]`, and its keys below"
+
+
 def _words(detail: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
     """What was expected and found, and the hint."""
     kind, context, found = detail["type"], detail.get("ctx", {}), shown(detail["input"])
     if kind == "tour":
         return context["message"], context["hint"]
     if kind == "missing":
-        return "expected this key, found none", ""
+        return "expected this key, found none", f"write {_written(detail['loc'], model)}"
     if kind == "literal_error":
         words = tuple(re.findall(r"'([^']*)'", context["expected"]))
         return f"{listed(words)}, found {found}", _meant(str(detail["input"]), words)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -16,6 +14,7 @@ from tourgen.tour.faults import faults_of
 from tourgen.tour.scans import check_headers, check_scans
 from tourgen.tour.tables import TOUR_FILE, Room, Tour, TourFile
 from tourgen.tour.theme import load_theme
+from tourgen.tour.toml import read_toml
 from tourgen.tour.values import Context
 
 _READING_KEYS: Final = {"id", "scans", "unit", "up", "clean"}
@@ -122,28 +121,13 @@ def _tour(folder: Path, file: TourFile) -> Tour:
 
 def _parse(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        return read_toml(path)
     except FileNotFoundError:
         told = InputError(
             f"{TOUR_FILE}: expected a file in `{path.parent}`, found none",
             f"write one with `tourgen new {path.parent}`",
         )
-    except OSError as error:
-        told = InputError(f"{TOUR_FILE}: expected a file that can be read, found: {error.strerror}")
-    except UnicodeDecodeError as error:
-        told = InputError(
-            f"{TOUR_FILE}: expected UTF-8, found byte {error.object[error.start]:#x} at "
-            f"position {error.start}",
-            "save the file as UTF-8",
-        )
-    except tomllib.TOMLDecodeError as error:
-        place = re.search(r"^(.*) \(at (?:line (\d+), column (\d+)|end of document)\)$", str(error))
-        reason = place[1] if place else str(error)
-        where = f"line {place[2]}, column {place[3]}" if place and place[2] else "end of the file"
-        told = InputError(
-            f"{TOUR_FILE}: {where}: expected TOML, found: {reason[:1].lower()}{reason[1:]}"
-        )
-    raise Faults((told,)) from None
+    raise Faults((told,))
 
 
 def _context(folder: Path, data: Mapping[str, Any]) -> Context:

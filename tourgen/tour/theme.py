@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +12,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from tourgen.errors import Faults, InputError
 from tourgen.tour.faults import faults_of
+from tourgen.tour.toml import read_toml
 from tourgen.tour.values import Context, File, Form, fault, shown
 
 THEME_FILE: Final = "theme.toml"
@@ -85,13 +85,10 @@ def load_theme(folder: Path) -> Theme:
     Raises:
         Faults: All that is wrong with it.
     """
-    path = folder / THEME_FILE
-    if not path.exists():
-        return Theme()
     try:
-        data = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except (ValueError, OSError) as error:
-        raise Faults((InputError(f"{THEME_FILE}: expected TOML, found: {error}"),)) from None
+        data = read_toml(folder / THEME_FILE)
+    except FileNotFoundError:
+        return Theme()
     try:
         told = ThemeFile.model_validate(data, context=Context(folder, (), ()))
     except ValidationError as error:

@@ -206,7 +206,8 @@ def _check_room_id(value: str, info: ValidationInfo) -> str:
 
 def _check_target(value: str, info: ValidationInfo) -> str:
     if info.context and value not in info.context.rooms:
-        raise fault(f"room `{value}` does not exist", near(value, info.context.rooms))
+        hint = near(value, info.context.rooms) or f"rooms: {', '.join(info.context.rooms)}"
+        raise fault(f"room `{value}` does not exist", hint)
     return value
 
 
@@ -327,7 +328,7 @@ NeighbourRef = Annotated[str, AfterValidator(_check_neighbour), Form("`id` of a 
 Address = Annotated[str, AfterValidator(_check_address), Form("address")]
 Moment = Annotated[str, BeforeValidator(_check_moment), Form("date, or date and time")]
 Languages = Annotated[tuple[str, ...], AfterValidator(_check_languages)]
-Pin = Annotated[str, AfterValidator(_check_pin), Form("string of digits")]
+Pin = Annotated[str, AfterValidator(_check_pin), Form("four to eight digits, as a string")]
 Hours = Annotated[
     Mapping[str, str], BeforeValidator(_check_hours), Form("hours, or table by day, `mon` to `sun`")
 ]
