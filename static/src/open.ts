@@ -1,7 +1,7 @@
 /**
  * Opens the room that page and address say, or shows the plain page. The poster is all that a
- * visitor waits for, and stands first: whatever the room needs is asked for after it, on a phone
- * when the whole page stands, which is read first there.
+ * visitor waits for, and stands first: the room begins when it is drawn. What the room needs is asked
+ * for meanwhile, on a phone when the whole page stands, which is read first there.
  */
 
 import { takeAlongInTime } from "./along/along.ts";

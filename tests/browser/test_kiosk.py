@@ -257,7 +257,11 @@ def test_the_service_corner_counts_visits_by_room_and_language(kiosk: Kiosk) -> 
     with page.expect_download() as saved:
         page.get_by_role("button", name="Save the visits").click()
     rows = list(csv.DictReader(Path(saved.value.path()).read_text("utf-8").splitlines()))
+    visits = page.locator(".figures div", has_text="Visits")
+    assert visits.locator("dd").inner_text() == "2"
     assert [(row["room"], row["language"], row["visits"]) for row in rows] == [
+        ("", "en", "1"),
+        ("", "fr", "1"),
         ("chamber1", "en", "1"),
         ("chamber1", "fr", "1"),
         ("stairs", "en", "1"),

@@ -92,7 +92,7 @@ export class Kiosk {
   opened(room: Room): void {
     this.#failedSince = null;
     if (this.#state !== "visit") return;
-    this.#visits.count(room.id, this.#front.language, new Date());
+    this.#visits.entered(room.id, this.#front.language, new Date());
   }
 
   /** Everything as if nobody had been here. */
@@ -115,6 +115,7 @@ export class Kiosk {
   }
 
   #begin(language: string): void {
+    this.#visits.begun(language, new Date());
     this.#idle.reset();
     this.#enter("visit");
     this.#start.hide();

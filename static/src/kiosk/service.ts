@@ -82,7 +82,7 @@ export function serviceSheet(host: ServiceHost): Node[] {
   };
   row(words.serviceUptime, lasting(performance.now() / 1000));
   row(words.serviceMemory, memory(number) ?? words.serviceUnknown);
-  row(words.serviceVisits, number.format(visits.rows.reduce((sum, [, , , n]) => sum + n, 0)));
+  row(words.serviceVisits, number.format(visits.total));
   row(words.serviceFaults, number.format(faults.all.length));
   const told = element("p", { role: "status" });
   const act = (label: string, does: () => void): HTMLElement => {
@@ -106,6 +106,7 @@ export function serviceSheet(host: ServiceHost): Node[] {
 
 function visitTable({ tour, visits, language, words }: ServiceHost): HTMLElement {
   const titles = new Map(tour.rooms.map((room) => [room.id, textIn(room.title, language)]));
+  const whole = textIn(tour.title, language);
   const head = [words.serviceDay, words.room, words.language, words.serviceVisits];
   const rows = [...visits.rows].reverse().slice(0, SHOWN);
   return element(
@@ -116,7 +117,7 @@ function visitTable({ tour, visits, language, words }: ServiceHost): HTMLElement
       element(
         "tr",
         {},
-        ...[day, titles.get(room) ?? room, spoken, String(count)].map((cell) =>
+        ...[day, room ? (titles.get(room) ?? room) : whole, spoken, String(count)].map((cell) =>
           element("td", {}, cell),
         ),
       ),

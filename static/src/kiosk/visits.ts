@@ -1,9 +1,13 @@
-/** How many visits there were, by day, room and language; on this device, of nobody. */
+/**
+ * How many visits there were, by day and language, and how often each room was entered; on this
+ * device, of nobody.
+ */
 
 const KEY = "tourgen.visits";
 const DAYS_KEPT = 400;
+const TOUR = "";
 
-/** By day, "2026-05-12", then by "room language". */
+/** By day, "2026-05-12", then by "room language"; " language" is of the tour. */
 type Counts = Record<string, Record<string, number>>;
 
 export class Visits {
@@ -13,8 +17,17 @@ export class Visits {
     this.#counts = read();
   }
 
+  /** Counts a visit, which has begun. */
+  begun(language: string, now: Date): void {
+    this.#count(TOUR, language, now);
+  }
+
   /** Counts a room that a visitor has come to. */
-  count(room: string, language: string, now: Date): void {
+  entered(room: string, language: string, now: Date): void {
+    this.#count(room, language, now);
+  }
+
+  #count(room: string, language: string, now: Date): void {
     const day = dayOf(now);
     const today = (this.#counts[day] ??= {});
     const key = `${room} ${language}`;
@@ -24,7 +37,12 @@ export class Visits {
     write(this.#counts);
   }
 
-  /** One line each: day, room, language, visits. */
+  /** Of all days. */
+  get total(): number {
+    return this.rows.reduce((sum, [, room, , visits]) => sum + (room === TOUR ? visits : 0), 0);
+  }
+
+  /** One line each: day, room, "" for the tour, language, visits. */
   get rows(): readonly (readonly [day: string, room: string, language: string, visits: number])[] {
     return Object.entries(this.#counts)
       .sort()
