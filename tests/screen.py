@@ -26,6 +26,7 @@ ATTRACTS = (
 _ENDS_WITHIN_S = 15.0
 _CONNECT_MS = 2_000.0
 """A browser that is just ending may take a call, and never answer."""
+_LOOKS_EVERY_S = 0.25
 _WATCHED = Path(__file__).parent / "commands/kiosk_watched.py"
 
 
@@ -71,6 +72,7 @@ class Kiosk:
         end, patience_ms = time.monotonic() + within_s, _CONNECT_MS
         while time.monotonic() < end:
             assert self.process.poll() is None, self.said
+            browser = None
             try:
                 door = f"http://127.0.0.1:{self.door}"
                 browser = self.driver.chromium.connect_over_cdp(door, timeout=patience_ms)
@@ -79,12 +81,13 @@ class Kiosk:
                     # published headers refuse that, and it ends by an error.
                     page.wait_for_function(condition, timeout=patience_ms, polling=100)
                     return page
-                browser.close()  # it goes on: what is given up is the look into it
             except TimedOut:
                 patience_ms *= 2  # on a busy machine it takes its time
             except BrowserError:
                 pass
-            time.sleep(0.1)
+            if browser:
+                browser.close()  # it goes on: what is given up is the look into it
+            time.sleep(_LOOKS_EVERY_S)
         raise AssertionError(f"{condition}: not so within {within_s} s; {self.said}")
 
     def family(self, kind: str = "") -> list[int]:
