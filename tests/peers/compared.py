@@ -22,7 +22,7 @@ from tourgen.headers import SECURITY_HEADERS
 __all__ = ["ALIKE_DB", "OURS", "TIMES", "Row", "compared"]
 
 TIMES = 7
-QUALITIES = (40, 50, 60, 70, 80, 85, 90, 95, 100)
+QUALITIES = (5, 10, 20, 30, 40, 50, 60, 70, 80, 85, 90, 95, 100)
 """Of WebP: the least is taken that comes as near to the lossless picture as ours."""
 OURS = "tourgen"
 SETTLED = "window.tourgen?.idle"

@@ -73,6 +73,11 @@ class _Watch:
         self.session.on("Network.loadingFinished", self._ended)
         self.session.on("Page.screencastFrame", self._shown)
 
+    def stop(self) -> None:
+        """No more pictures: one that comes while the page closes could not be answered."""
+        self.session.remove_listener("Page.screencastFrame", self._shown)
+        self.session.send("Page.stopScreencast")
+
     def bytes_until(self, at: float) -> int:
         """All that had come at a time of the day; of what is sent compressed, only when whole."""
         total = 0
@@ -126,7 +131,7 @@ def loaded(browser: Browser, url: str, done: str, before: str = "") -> Loading:
     _wait(page, "window.doneAt")
     ended = page.evaluate("window.doneAt")
     sharp = _settled(page)
-    watch.session.send("Page.stopScreencast")
+    watch.stop()
     page.context.close()
     for at, data in watch.pictures:
         if at > begun and _is_whole(_decoded(base64.b64decode(data)), sharp):

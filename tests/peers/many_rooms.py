@@ -28,11 +28,12 @@ ROOMS = (1, 2, 4, 8)
 POINTS, MORE = 130_000, 100
 MOST_S, MOST_MB = 3600.0, 20_000.0
 HEADING = "Many rooms"
-PREAMBLE = f"""Made by `make bench-rooms`: tours of so many rooms of {POINTS:,} points each, built
-without a cache on one core, and on two, in seconds, and by one and by two workers of one thread and
-one core each, of a dask cluster. `times`: the former over the latter. `same`: whether all four
-published the same bytes. Then the same command again: with nothing changed, and after the tour's
-title was.
+PREAMBLE = f"""Made by `make bench-rooms`: tours of so many rooms of {POINTS:,} points each (and a
+few more, so that no two are alike), built without a cache on one core, and on two, in seconds, and
+by one and by two workers of one thread and one core each, of a dask cluster. `times`: the former
+over the latter. `same`: whether all four published the same bytes. Then the same command again:
+with nothing changed, and after the tour's title was. `MB`: at the peak on two cores, the sum over
+processes of proportional memory.
 """
 COLUMNS = (
     *("rooms", "one core", "two cores", "times", "MB"),
