@@ -23,6 +23,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from tourgen.errors import StageError
+
 Ingredients = Mapping[str, Any]
 
 _FOLDER = ".tourgen"
@@ -89,19 +91,28 @@ class Cache:
         return Cost(**about["cost"])
 
     def load(self, key: str) -> Any:
-        """The result; None where there is none that is whole."""
+        """The result; None where there is none that is whole: what is left of it is dropped.
+
+        Raises:
+            StageError: It can neither be read nor dropped.
+        """
         folder = self._results / key
         try:
             about = json.loads((folder / "about.json").read_text())
-            if _digest(folder) != about["sha256"]:
-                shutil.rmtree(folder, ignore_errors=True)
-                return None
-            data = (folder / _RESULT).read_bytes()
-            arrays = _mapped(folder / _ARRAYS, about["arrays"])
-            os.utime(folder)
+            if _digest(folder) == about["sha256"]:
+                data = (folder / _RESULT).read_bytes()
+                arrays = _mapped(folder / _ARRAYS, about["arrays"])
+                os.utime(folder)
+                return pickle.loads(data, buffers=arrays)
         except (OSError, ValueError, KeyError):
-            return None
-        return pickle.loads(data, buffers=arrays)
+            pass
+        shutil.rmtree(folder, ignore_errors=True)
+        if folder.exists():
+            raise StageError(
+                f"`{folder}`: expected a result that can be read or dropped, found neither",
+                f"delete `{self._root}`, as the user who made it, and build again",
+            )
+        return None
 
     def store(self, key: str, result: Any, cost: Cost) -> None:
         """Keep a result; a second store of one key changes nothing."""

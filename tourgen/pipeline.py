@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tourgen.cache import Cache, Cost, stamp_of
-from tourgen.errors import TourgenError
+from tourgen.errors import StageError, TourgenError
 from tourgen.expected import stage_of
 from tourgen.fitting import picture, points, surface
 from tourgen.geometry import View
@@ -48,6 +48,8 @@ from tourgen.stages import (
 from tourgen.tasks import Task, in_order, missing_tasks, task, why
 from tourgen.tour import Room, Tour
 from tourgen.workers import Workers
+
+_ROUNDS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -463,7 +465,9 @@ def build_rooms(
     wanted = {room: RoomTasks(each.goals, each.scan_mb) for room, each in by_id.items()}
     ran: dict[str, set[str]] = {room: set() for room in by_id}
     found: dict[str, RoomResult | TourgenError] = {}
-    while wanted:  # again only where an entry turns out to be broken
+    for _ in range(_ROUNDS):  # again only where an entry turns out to be broken
+        if not wanted:
+            break
         for room, outcome in run_missing(wanted, cache, workers, announce, profiles).items():
             if isinstance(outcome, TourgenError):
                 found[room] = outcome
@@ -473,6 +477,11 @@ def build_rooms(
             if result is not None:
                 found[room] = result
         wanted = {room: each for room, each in wanted.items() if room not in found}
+    for room in wanted:
+        found[room] = StageError(
+            f"room `{room}`: expected results that last, found them broken {_ROUNDS} times",
+            "look after the disk and the memory",
+        )
     return [found[recipe.room.id] for recipe in recipes]
 
 

@@ -10,6 +10,7 @@ is told and does not stop the others.
 from __future__ import annotations
 
 import errno
+from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
@@ -24,6 +25,7 @@ from tourgen.tasks import Job, Task, in_order, missing_tasks, run_job
 from tourgen.workers import Workers
 
 _TRIES = 2
+_LOSSES = 3
 
 Announce = Callable[[str, str, tuple[str, ...]], None]
 """Told the room, the task that starts, and all that still has to run of the room, that one first;
@@ -98,6 +100,8 @@ class _Schedule:
     _ran: dict[str, list[str]] = field(default_factory=dict)
     _failed: dict[str, TourgenError] = field(default_factory=dict)
     _known: dict[str, Task[Any]] = field(default_factory=dict)
+    _lost: Counter[str] = field(default_factory=Counter)
+    """How often each result was found to be broken."""
 
     def run(self) -> dict[str, tuple[str, ...] | TourgenError]:
         for room, wanted in self.rooms.items():
@@ -222,6 +226,13 @@ class _Schedule:
         return any(room in each.rooms for each in (*self._waiting.values(), *running))
 
     def _again(self, each: _Waiting, lost: Task[Any]) -> None:
+        self._lost[lost.key] += 1
+        if self._lost[lost.key] >= _LOSSES:
+            found = f"expected a result that lasts, found it broken {_LOSSES} times"
+            error = StageError(f"{lost.name}: {found}", "look after the disk and the memory")
+            for room in each.rooms:
+                self._fail(room, _told(room, each.task.name, error))
+            return
         for room in each.rooms:
             self._add(room, (*missing_tasks(self.cache, (lost,)), each.task))
 

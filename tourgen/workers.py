@@ -74,15 +74,22 @@ class Processes:
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
         """Run a function in a process that is free."""
-        return self._pool.submit(function, *arguments)
+        try:
+            return self._pool.submit(function, *arguments)
+        except (BrokenProcessPool, OSError):  # the latter where it is just breaking
+            self._renew()
+            return self._pool.submit(function, *arguments)
 
     def died(self, error: BaseException, /) -> bool:
         """A process that dies takes all others of its pool along."""
         if not isinstance(error, BrokenProcessPool):
             return False
+        self._renew()
+        return True
+
+    def _renew(self) -> None:
         self._pool.shutdown(wait=False)
         self._pool = self._started()
-        return True
 
     def stop(self) -> None:
         """End the processes."""

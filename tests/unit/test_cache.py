@@ -6,8 +6,10 @@ import os
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tourgen.cache import Cache, Cost, key_of
+from tourgen.errors import StageError
 
 COST = Cost(1.5, 200.0)
 
@@ -63,6 +65,36 @@ def test_an_entry_cut_short_counts_as_absent(tmp_path: Path) -> None:
     (data,) = tmp_path.rglob("result.pickle")
     data.write_bytes(data.read_bytes()[:100])
     assert cache.load("k") is None
+
+
+@pytest.mark.parametrize("name", ["about.json", "result.pickle", "arrays.bin"])
+@pytest.mark.parametrize("left", [b"", b"{}", None])
+def test_an_entry_that_lacks_a_file_counts_as_absent_and_is_dropped(
+    tmp_path: Path, name: str, left: bytes | None
+) -> None:
+    """A power cut leaves files empty, a killed pruning leaves some out."""
+    cache = Cache(tmp_path)
+    cache.store("k", np.arange(1000), COST)
+    (file,) = tmp_path.rglob(name)
+    file.unlink()
+    if left is not None:
+        file.write_bytes(left)
+    assert cache.load("k") is None
+    assert not cache.has("k")
+    cache.store("k", 2, COST)
+    assert cache.load("k") == 2
+
+
+def test_an_entry_that_can_neither_be_read_nor_dropped_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another user's, for example: a build that took it for absent would never end."""
+    cache = Cache(tmp_path)
+    cache.store("k", 1, COST)
+    monkeypatch.setattr("shutil.rmtree", lambda *_, **__: None)
+    next(tmp_path.rglob("about.json")).unlink()
+    with pytest.raises(StageError, match="expected a result that can be read or dropped"):
+        cache.load("k")
 
 
 def test_storing_twice_keeps_the_first(tmp_path: Path) -> None:

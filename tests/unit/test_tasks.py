@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import Mapping
 from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -88,6 +89,18 @@ def test_a_broken_input_is_made_anew(tmp_path: Path) -> None:
     (folder / "result.pickle").write_bytes(b"cut")
     assert run(cache, recipe(10)) == ["read", "solve", "pack"]
     assert cache.load(recipe(10)[0].key) == [30]
+
+
+def test_what_breaks_again_and_again_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a disk that loses what it is given: the build would never end."""
+    cache = Cache(tmp_path)
+    load, read = cache.load, in_order(recipe())[0].key
+    monkeypatch.setattr(cache, "load", lambda key: None if key == read else load(key))
+    outcome, _ = run_all(cache, {"room": recipe()})
+    assert isinstance(outcome["room"], TourgenError)
+    assert "read: expected a result that lasts, found it broken 3 times" in str(outcome["room"])
 
 
 def test_several_results_come_as_one_argument(tmp_path: Path) -> None:
@@ -175,6 +188,16 @@ def test_a_worker_that_dies_costs_a_retry(tmp_path: Path, tries: int) -> None:
         error = outcome["one"]
         assert isinstance(error, TourgenError)
         assert error.message.startswith("room `one`: last: expected a result, found")
+
+
+def test_who_asks_processes_of_which_one_has_died_gets_others() -> None:
+    """It dies between two tasks, and nobody has been told yet."""
+    workers = Processes(1)
+    try:
+        assert isinstance(workers.submit(_die, 0).exception(), BrokenProcessPool)
+        assert workers.submit(_twice, 2).result() == 4
+    finally:
+        workers.stop()
 
 
 def test_tasks_that_wait_for_nothing_run_at_once(tmp_path: Path) -> None:
