@@ -13,7 +13,7 @@ import numpy as np
 
 from tourgen.cache import Cache
 from tourgen.errors import Faults, InputError, TourgenError
-from tourgen.geometry import View
+from tourgen.geometry import Float64, View
 from tourgen.pipeline import (
     RoomRecipe,
     RoomResult,
@@ -27,6 +27,7 @@ from tourgen.progress import Listener
 from tourgen.remote import has_fetched, is_remote, send
 from tourgen.report import tour_report
 from tourgen.site import BuiltRoom, Made, write_site
+from tourgen.stages import entry
 from tourgen.threads import cores
 from tourgen.tour import Link, Tour, Viewpoint
 from tourgen.unchanged import forget_build, remember_build, seen_by_build
@@ -188,15 +189,25 @@ def _arrival(tour: Tour, link: Link, source: str, target: RoomResult) -> View:
     """Where a visitor arrives: as given, else inside the door back, else at the entry."""
     if link.arrive:
         return _view(link.arrive, target)
-    back = next((each for each in tour.room(link.to).links if each.to == source), None)
+    doors = tour.room(link.to).links
+    back = next((number for number, each in enumerate(doors) if each.to == source), None)
     if back is None:
         return target.entry
-    door = np.array(back.at) - target.summary.origin
-    inward = target.summary.bounds.mean(axis=0) - door
-    inward[2] = 0
-    inward /= max(float(np.linalg.norm(inward)), 1e-6)
+    door = np.array(doors[back].at) - target.summary.origin
+    return inside_door(door, target.plan.door_floor_m[back], target.plan.door_way[back])
+
+
+def inside_door(door: Float64, floor_m: float, way: Float64) -> View:
+    """Where one stands who came through a door, on its storey, looking into the room.
+
+    Args:
+        door: (3,) its mark, metres.
+        floor_m: Height of the floor there.
+        way: (2,) unit vector out of the room.
+    """
+    inward = np.append(-way, 0.0)
     position = door + _STEP_INSIDE_M * inward
-    position[2] = target.entry.position[2]
+    position[2] = floor_m + entry.Settings().eye_m
     return View(position, position + 2 * inward)
 
 

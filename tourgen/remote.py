@@ -17,6 +17,8 @@ from typing import Any
 from tourgen.errors import InputError, MissingTool
 
 _FOLDER = Path(".tourgen") / "fetched"
+_CHANGES = ("size", "ETag", "Last-Modified")
+"""What a web server tells of a file that has changed."""
 _PAGES = (".html", ".json")
 """Of a site, these are sent last: until then it shows what was there before."""
 
@@ -59,10 +61,13 @@ def fetch(folder: Path, name: str) -> None:
             raise InputError(
                 f"expected a file, found none at `{name}`", "look at its address in tour.toml"
             )
-        state = str(storage.ukey(path))
+        about = storage.info(path)
+        # What `ukey` tells of a web page is its address alone.
+        state = " ".join(str(each) for each in (storage.ukey(path), *map(about.get, _CHANGES)))
         if target.exists() and note.exists() and note.read_text("utf-8") == state:
             return
-        print(f"fetching {name}, {storage.size(path) / 1e6:.0f} MB", file=sys.stderr, flush=True)
+        size = f", {about['size'] / 1e6:.0f} MB" if about.get("size") else ""
+        print(f"fetching {name}{size}", file=sys.stderr, flush=True)
         shutil.rmtree(target.parent, ignore_errors=True)
         target.parent.mkdir(parents=True)
         aside = target.with_name(f".{target.name}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import re
@@ -451,5 +452,18 @@ def test_an_empty_folder_becomes_a_tour(tour: Tour, tmp_path: Path) -> None:
 
 def test_a_folder_that_cannot_be_written_is_told(tour: Tour, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
-    with pytest.raises(InputError, match="expected a folder that can be written"):
+    with pytest.raises(InputError, match="expected it to be read and written, found: Not a directory"):
         write(tour, tmp_path / "file" / "site")
+
+
+def test_a_full_disk_is_told_as_such(
+    tour: Tour, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It had been told as a folder that cannot be written."""
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match="No space left"):
+        write(tour, tmp_path / "site")

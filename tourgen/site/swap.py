@@ -7,6 +7,7 @@ build killed between the two leaves the old site under a hidden name, from which
 
 from __future__ import annotations
 
+import errno
 import json
 import shutil
 from collections.abc import Mapping, Sequence
@@ -69,13 +70,16 @@ def write_site(
         if out.exists():
             out.rename(old)
         fresh.rename(out)
-        _remove(old)
-        return report
     except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise
         raise InputError(
-            f"`{out}`: expected a folder that can be written, found: {error.strerror or error}",
-            "choose another with `-o`",
+            f"`{error.filename or out}`: expected it to be read and written, "
+            f"found: {error.strerror or error}",
+            f"look whether it is there, and whose it is; or publish elsewhere than `{out}` by `-o`",
         ) from error
+    shutil.rmtree(old, ignore_errors=True)  # what is left of it the next build drops
+    return report
 
 
 def restore_site(out: Path) -> None:
