@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from tourgen.alone import alone
 from tourgen.cache import Cache
 from tourgen.errors import Faults, InputError, TourgenError
 from tourgen.geometry import Float64, View
@@ -34,6 +35,7 @@ from tourgen.unchanged import forget_build, remember_build, seen_by_build
 from tourgen.workers import Workers, workers
 
 _STEP_INSIDE_M = 0.9
+_LOCK = Path(".tourgen") / "lock"
 _SENT = Path(".tourgen") / "sent"
 """Where a site is kept that is sent elsewhere."""
 
@@ -96,38 +98,43 @@ def build_tour(
         The report.
 
     Raises:
-        InputError: ``only`` cannot be used, or the output folder.
+        InputError: ``only`` cannot be used, or the output folder; or another build runs.
         MissingTool: The library for the address is not installed.
         RoomsFailed: Rooms could not be built.
         Faults: The single file of a room would be larger than browsers open.
     """
-    started = time.perf_counter()
-    sent = is_remote(str(out))
-    here = tour.folder / _SENT if sent else Path(out)
-    seen = seen_by_build(tour.folder, here, sources(tour))
-    cache = Cache(tour.folder)
-    recipes = tour_recipes(tour, cache)
-    _require_built(recipes, [tour.room(room_id).id for room_id in only], cache)
-    at_work = any(planned(recipe, cache) for recipe in recipes)
-    with workers((jobs or cores()) if at_work else 1, cluster if at_work else None) as crew:
-        if profile:
-            outcomes = _profiled(recipes, cache, crew, listener, profile)
+    busy = InputError(
+        f"`{tour.folder}`: expected no other build of it, found one that runs",
+        "wait for that one, or stop it",
+    )
+    with alone(tour.folder / _LOCK, busy):
+        started = time.perf_counter()
+        sent = is_remote(str(out))
+        here = tour.folder / _SENT if sent else Path(out)
+        seen = seen_by_build(tour.folder, here, sources(tour))
+        cache = Cache(tour.folder)
+        recipes = tour_recipes(tour, cache)
+        _require_built(recipes, [tour.room(room_id).id for room_id in only], cache)
+        at_work = any(planned(recipe, cache) for recipe in recipes)
+        with workers((jobs or cores()) if at_work else 1, cluster if at_work else None) as crew:
+            if profile:
+                outcomes = _profiled(recipes, cache, crew, listener, profile)
+            else:
+                outcomes = build_rooms(recipes, cache, crew, listener)
+        rooms = [outcome for outcome in outcomes if isinstance(outcome, RoomResult)]
+        if len(rooms) < len(outcomes):
+            raise RoomsFailed(tuple(each for each in outcomes if isinstance(each, TourgenError)))
+        report = tour_report(rooms, time.perf_counter() - started)
+        published = _published(tour, {room.id: room for room in rooms})
+        report = write_site(tour, published, report, here, single_files=single_files)
+        if sent:
+            send(here, str(out))
+        cache.prune(frozenset(key for recipe in recipes for key in recipe.keys))
+        if sent or has_fetched(tour.folder):
+            forget_build(tour.folder)
         else:
-            outcomes = build_rooms(recipes, cache, crew, listener)
-    rooms = [outcome for outcome in outcomes if isinstance(outcome, RoomResult)]
-    if len(rooms) < len(outcomes):
-        raise RoomsFailed(tuple(each for each in outcomes if isinstance(each, TourgenError)))
-    report = tour_report(rooms, time.perf_counter() - started)
-    published = _published(tour, {room.id: room for room in rooms})
-    report = write_site(tour, published, report, here, single_files=single_files)
-    if sent:
-        send(here, str(out))
-    cache.prune(frozenset(key for recipe in recipes for key in recipe.keys))
-    if sent or has_fetched(tour.folder):
-        forget_build(tour.folder)
-    else:
-        remember_build(tour.folder, here, seen)
-    return report
+            remember_build(tour.folder, here, seen)
+        return report
 
 
 def _profiled(

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from box_tour import box_scan
+from filelock import FileLock
 from PIL import Image
 from published import published_files
 from scan_files import cloud_table, write_ply
@@ -269,3 +270,16 @@ def test_a_disk_that_fills_is_one_clear_line(box_copy: Path, tmp_path: Path) -> 
     assert all(re.match("error: .*expected room.*, found none left$", line) for line in lines)
     assert published_files(tmp_path / "left") == before
     assert published_files(tmp_path / "mended") == before
+
+
+def test_two_builds_of_one_tour_do_not_meet(
+    box_copy: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first to end dropped what the other was about to keep."""
+    (box_copy / "tour.toml").touch()
+    before = published_files(box_copy / "site")
+    with FileLock(box_copy / ".tourgen/lock"):
+        assert main(["build", str(box_copy)]) == 2
+    assert "expected no other build of it, found one that runs" in capsys.readouterr().err
+    assert published_files(box_copy / "site") == before
+    assert main(["build", str(box_copy)]) == 0

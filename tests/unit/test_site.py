@@ -452,7 +452,7 @@ def test_an_empty_folder_becomes_a_tour(tour: Tour, tmp_path: Path) -> None:
 
 def test_a_folder_that_cannot_be_written_is_told(tour: Tour, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
-    with pytest.raises(InputError, match="expected it to be read and written, found: Not a directory"):
+    with pytest.raises(InputError, match="expected it to be read and written, found: Not"):
         write(tour, tmp_path / "file" / "site")
 
 

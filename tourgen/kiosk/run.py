@@ -6,16 +6,16 @@ import hashlib
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from threading import Event, Thread
 from typing import Final
 
-import filelock
 import platformdirs
 
+from tourgen.alone import alone
 from tourgen.doctor import BROWSERS, browser
 from tourgen.errors import InputError, MissingTool
 from tourgen.kiosk.lines import KioskHandler
@@ -57,7 +57,12 @@ def run_kiosk(site: Path, port: int = 8710, say: Callable[[str], None] = print) 
         )
     restore_site(site)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # with the browser, as by Ctrl+C
-    with _alone(site) as kept:
+    kept = _kept(site)
+    busy = InputError(
+        f"`{site}`: expected no other kiosk, found one that shows it",
+        "close that one first, by its service corner or Ctrl+C",
+    )
+    with alone(kept / "lock", busy):
         vigil, ended = Vigil(), Event()
         answer = partial(KioskHandler, vigil=vigil, ended=ended, kept=kept)
         with open_server(site, port=port, handler=answer) as server:
@@ -119,21 +124,7 @@ def _watched(ends: Callable[[], int | None], vigil: Vigil, ended: Event) -> str 
     return None
 
 
-@contextmanager
-def _alone(site: Path) -> Iterator[Path]:
-    """What is kept of this kiosk on this machine, for it alone."""
+def _kept(site: Path) -> Path:
+    """Where what is kept of this kiosk lies on this machine."""
     name = hashlib.sha256(str(site.resolve()).encode()).hexdigest()[:12]
-    kept = Path(platformdirs.user_state_dir("tourgen")) / f"kiosk-{name}"
-    kept.mkdir(parents=True, exist_ok=True)
-    lock = filelock.FileLock(kept / "lock")
-    try:
-        lock.acquire(timeout=0)
-    except filelock.Timeout:
-        raise InputError(
-            f"`{site}`: expected no other kiosk, found one that shows it",
-            "close that one first, by its service corner or Ctrl+C",
-        ) from None
-    try:
-        yield kept
-    finally:
-        lock.release()
+    return Path(platformdirs.user_state_dir("tourgen")) / f"kiosk-{name}"
