@@ -226,7 +226,7 @@ def room_recipe(room: Room, folder: Path, digests: Mapping[Path, str]) -> RoomRe
         "tiles",
         tiles.tiles,
         simplified,
-        settings=tiles.Settings(),
+        settings=tiles.Settings(texel_m=room.texture.texel_mm / 1000),
         version=tiles.VERSION,
         libraries=("fast-simplification",),
     )

@@ -93,3 +93,14 @@ def test_a_small_room_is_one_tile() -> None:
     mesh = bumpy_sphere(2)
     (only,) = tiles(Levels(mesh, mesh), Settings())
     assert only == Tile("r", mesh, 0.0, ())
+
+
+@pytest.mark.parametrize(("texel_m", "count"), [(0.004, 4), (0.02, 1)])
+def test_a_room_of_few_faces_has_leaves_where_they_show_finer_texels(
+    texel_m: float, count: int
+) -> None:
+    """Its root, of every face, had no error, and so its leaves were never shown."""
+    mesh = bumpy_sphere(4)  # 5,120 faces, 50 square metres
+    found = tiles(Levels(mesh, mesh), Settings(leaf_faces=2000, texel_m=texel_m))
+    assert len(found) == count
+    assert found[0].geometric_error_m == pytest.approx(0.0 if count == 1 else 0.01, rel=0.1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -39,6 +40,7 @@ from tourgen.stages import (
     poster,
     register,
     sift,
+    tiles,
     unwrap,
     viewpoints,
 )
@@ -51,7 +53,6 @@ if TYPE_CHECKING:
     from PIL.Image import Image as Picture
 
 Item = TypeVar("Item")
-_ROOT_TEXELS = 500_000
 _POSTER_QUALITY = 82
 _PREVIEW = (1200, 630)
 """As most of those who show previews of links ask for, pixels."""
@@ -191,7 +192,9 @@ def _texels(
         texel_m[tile.id] = max(finest_m, 0.5 * float(np.median(1 / np.sqrt(density))))
     root = room[0]
     if root.children:
-        texel_m[root.id] = float(np.sqrt(face_areas(root.mesh).sum() / _ROOT_TEXELS))
+        area_m2 = float(face_areas(root.mesh).sum())
+        below_m = min(texel_m[child] for child in root.children)
+        texel_m[root.id] = max(below_m, math.sqrt(area_m2 / tiles.ROOT_TEXELS))
     return texel_m
 
 

@@ -20,10 +20,19 @@ from tourgen.geometry import Mesh, Tile
 from tourgen.rays import ray_scene
 from tourgen.stages.halving import halved
 from tourgen.stages.levels import Levels
-from tourgen.stages.mesh_arrays import compact, components, face_adjacency, on_grid, weld
+from tourgen.stages.mesh_arrays import (
+    compact,
+    components,
+    face_adjacency,
+    face_areas,
+    on_grid,
+    weld,
+)
 from tourgen.stages.simplify import simplified
 
-VERSION = 4
+VERSION = 5
+ROOT_TEXELS = 500_000
+"""Of the root's picture, about, at any size of the room."""
 _ISLAND_FACES = 60
 _IDS = "0123456789abcdefghijklmnopqrstuvwxyz"
 
@@ -36,11 +45,13 @@ class Settings:
         leaf_faces: Faces of a leaf, about.
         children: Children of a branch, about.
         branch_ratio: Faces of a branch over those of its children.
+        texel_m: Edge of a leaf's texels, at the finest.
     """
 
     leaf_faces: int = 4_000
     children: int = 8
     branch_ratio: float = 0.15
+    texel_m: float = 0.004
 
 
 def tiles(levels: Levels, settings: Settings) -> tuple[Tile, ...]:
@@ -52,15 +63,20 @@ def tiles(levels: Levels, settings: Settings) -> tuple[Tile, ...]:
 
     Returns:
         All tiles, parents before children; the first is the root, whose mesh is the coarse one.
+        One alone where that shows all that leaves would, faces and texels.
     """
     finest = levels.finest
     count = int(np.ceil(len(finest.faces) / settings.leaf_faces))
-    if count == 1:
+    root_texel_m = float(np.sqrt(face_areas(levels.root).sum() / ROOT_TEXELS))
+    is_all = len(levels.root.faces) == len(finest.faces) and root_texel_m <= settings.texel_m
+    if count == 1 or is_all:
         return (Tile("r", finest, 0.0, ()),)
     leaves = _leaf_meshes(finest, count)
     branches = _children("r", leaves, settings)
     error_m = max(
-        _deviation_m(finest, levels.root), 2 * max(b[0].geometric_error_m for b in branches)
+        _deviation_m(finest, levels.root),
+        2 * max(b[0].geometric_error_m for b in branches),
+        root_texel_m,  # a root with every face is coarse nonetheless
     )
     root = Tile("r", levels.root, error_m, tuple(branch[0].id for branch in branches))
     return (root, *(tile for branch in branches for tile in branch))

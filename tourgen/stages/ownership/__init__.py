@@ -25,6 +25,7 @@ off blurs the steps that are finer than a quarter of a degree.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from threading import Event
 
 import numpy as np
 import numpy.typing as npt
@@ -92,13 +93,18 @@ def ownership(
     """
     asked = np.arange(len(points)) if asked is None else asked
     nobody = np.full(len(asked), -1, np.int16)
+    lacking = Event()  # one without a grid is enough: the others need not be sought
 
     def sought(number: int) -> Grid | None:
-        return _grid(points, stations[number], settings, np.random.default_rng([0, number]))
+        if lacking.is_set():
+            return None
+        grid = _grid(points, stations[number], settings, np.random.default_rng([0, number]))
+        if grid is None:
+            lacking.set()
+        return grid
 
-    grids = each(sought, range(len(stations)))
-    found = [grid for grid in grids if grid is not None]
-    if not found or len(found) < len(grids):
+    found = [grid for grid in each(sought, range(len(stations))) if grid is not None]
+    if not found or len(found) < len(stations):
         return Ownership(nobody, stations)
     places = np.array([grid.place for grid in found])
     points = points[asked]
