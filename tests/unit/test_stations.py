@@ -52,3 +52,12 @@ def scanned_level(
     away = np.hypot(*(points[:, :2] - tripod).T)
     density = np.exp(-1.5 * (away - 0.8)) + 0.05
     return np.float32(points[(away > 0.8) & (rng.random(len(points)) < density)])
+
+
+def test_ground_far_outside_takes_no_memory() -> None:
+    """Seen through a door, at the floor's height: the map had covered all of it."""
+    rng = np.random.default_rng(0)
+    room = scanned_level(rng, (-4, -2.5), (4, 2.5), 0.0, (-2.0, 0.0))
+    ground = np.float32(rng.uniform([-2e4, -2e4, 0], [2e4, 2e4, 0], (len(room) // 200, 3)))
+    found = stations.find_stations(np.concatenate([room, ground]), stations.Settings())
+    np.testing.assert_allclose(found, [[-2.0, 0.0, 1.4]], atol=0.12)

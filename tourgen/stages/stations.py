@@ -18,13 +18,16 @@ from scipy.ndimage import gaussian_filter
 from tourgen.geometry import Float32, Float64
 from tourgen.threads import each
 
-VERSION = 4
+VERSION = 5
 _SECTORS = 8
 _BIN_M = 0.02
 _LEVEL_SHARE = 0.2
 """Of the points of the fullest height; the floor of the demo's rooms holds 0.4 of the ceiling's."""
 _MOST_POINTS = 16_000_000
 """Of more every so manieth is looked at: they tell a disc as well."""
+_FAR_SHARE, _FAR_M = 0.01, 2.0
+"""What lies so far beyond all but so small a share of a level's points is no floor of the room: the
+ground outside, seen through a door, of which a map would take all memory."""
 _ABOVE_SHARE = 0.1
 """Of all points: a ceiling has next to none above it."""
 
@@ -116,6 +119,7 @@ def _discs(points: Float32, level_z: float, settings: Settings) -> Iterator[_Dis
     level = _slab(points, level_z, 0.03)[:, :2].astype(np.float64)
     if len(level) < 1000:
         return
+    level = _without_far(level)
     low = level.min(axis=0)
     cell = np.floor((level - low) / settings.cell_m).astype(int)
     shape = cell.max(axis=0) + 1
@@ -136,6 +140,12 @@ def _discs(points: Float32, level_z: float, settings: Settings) -> Iterator[_Dis
         yield _Disc(np.array([*centre, level_z + height]), radius, float(score[best]))
         near = np.hypot(x - best[1], y - best[2]) < 0.7 * radius / settings.cell_m
         score[:, near] = -np.inf
+
+
+def _without_far(level: Float64) -> Float64:
+    low, high = np.quantile(level, [_FAR_SHARE, 1 - _FAR_SHARE], axis=0)
+    near: Float64 = level[((level > low - _FAR_M) & (level < high + _FAR_M)).all(axis=1)]
+    return near
 
 
 def _is_clear(points: Float32, disc: _Disc, settings: Settings) -> bool:
