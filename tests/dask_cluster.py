@@ -18,13 +18,14 @@ _ALONE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS"
 
 @contextmanager
 def cluster(
-    folder: Path, cores: Sequence[int | None] = (None, None)
+    folder: Path, cores: Sequence[int | None] = (None, None), threads: int = 1
 ) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """The address of a scheduler, and its workers, of one thread each.
+    """The address of a scheduler, and its workers.
 
     Args:
         folder: Where it keeps its files.
         cores: That each worker is bound to; None: to no one.
+        threads: Of each worker.
     """
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)
@@ -42,7 +43,7 @@ def cluster(
         )
 
     running = [start(None, "scheduler", "--host", "127.0.0.1", "--port", "0")]
-    worker = ("worker", "--nthreads", "1", "--no-nanny", "--host", "127.0.0.1")
+    worker = ("worker", "--nthreads", str(threads), "--no-nanny", "--host", "127.0.0.1")
     running += [start(core, *worker) for core in cores]
     try:
         yield _address(file, len(cores)), running[1:]

@@ -156,6 +156,7 @@ class _Schedule:
             chosen = due[0]
             alone = leaves_cores(chosen.task.name)
             share = free if alone else max(1, free // min(slots, len(due)))
+            share = min(share, self.workers.widest)
             del self._waiting[chosen.task.key]
             for room in chosen.rooms:
                 self.announce(room, chosen.task.name, self._ahead(room, chosen))
@@ -171,7 +172,7 @@ class _Schedule:
             return True
         if each.tries or any(running.tries for running, _ in self._running.values()):
             return False
-        left = available_mb()
+        left = available_mb() if self.workers.are_here else None
         return left is None or each.needs_mb < left
 
     def _is_due(self, each: _Waiting, first: _Waiting) -> bool:

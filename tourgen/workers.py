@@ -26,10 +26,14 @@ class Workers(Protocol):
     Attributes:
         most: Functions that run at once.
         threads: That all of them may use together.
+        widest: That one of them may use.
+        are_here: Whether they share the memory of this machine.
     """
 
     most: int
     threads: int
+    widest: int
+    are_here: bool
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
         """Begin to run a function."""
@@ -42,9 +46,10 @@ class Here:
     """This process, one function after the other."""
 
     most = 1
+    are_here = True
 
     def __init__(self) -> None:
-        self.threads = cores()
+        self.threads = self.widest = cores()
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
         """Run a function to its end."""
@@ -63,9 +68,11 @@ class Here:
 class Processes:
     """Processes of this machine, started when first needed."""
 
+    are_here = True
+
     def __init__(self, most: int) -> None:
         self.most = most
-        self.threads = max(cores(), most)
+        self.threads = self.widest = max(cores(), most)
         self._pool = self._started()
 
     def _started(self) -> ProcessPoolExecutor:
@@ -99,12 +106,16 @@ class Processes:
 class Cluster:
     """Workers of a dask cluster that see the tour's folder where this process sees it."""
 
+    widest = 1
+    are_here = False
+
     def __init__(self, address: str) -> None:
         """Connect.
 
         Raises:
             MissingTool: The library for it is not installed.
-            InputError: No scheduler answers at the address, or it has no workers.
+            InputError: No scheduler answers at the address, or it has no workers, or such as run
+                several tasks in one process, for which not every library is made.
         """
         try:
             from distributed import Client
@@ -121,12 +132,15 @@ class Cluster:
                 "start `dask scheduler` and `dask worker`, and give the address that it tells",
             ) from None
         about = self._client.scheduler_info(n_workers=-1)["workers"].values()
-        self.most = self.threads = sum(each["nthreads"] for each in about)
-        if not self.most:
+        self.most = self.threads = len(about)
+        most_threads = max((each["nthreads"] for each in about), default=0)
+        if most_threads != 1:
             self.stop()
+            found = f"one of {most_threads}" if most_threads else "none"
             raise InputError(
-                f"--cluster: expected workers at `{address}`, found none",
-                "start `dask worker` on each machine that shares the tour's folder",
+                f"--cluster: expected workers of one thread at `{address}`, found {found}",
+                f"start `dask worker --nthreads 1 {address}` on each machine that shares the "
+                "tour's folder, as often as it has cores",
             )
         self._executor = self._client.get_executor(pure=False)
 

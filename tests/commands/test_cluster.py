@@ -65,3 +65,16 @@ def test_no_scheduler_is_one_clear_line(
     )
     assert told[-1].startswith("hint: start `dask scheduler`")
     assert published_files(box_copy / "site") == before
+
+
+def test_workers_of_several_threads_are_refused_in_a_line(
+    box_copy: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As `dask worker` starts them: they share what some libraries keep of a mesh at work."""
+    (box_copy / "tour.toml").touch()
+    shutil.rmtree(box_copy / ".tourgen")
+    with cluster(tmp_path, (None,), threads=2) as (address, _):
+        assert main(["build", str(box_copy), "--cluster", address]) == 2
+    told = capsys.readouterr().err
+    assert f"expected workers of one thread at `{address}`, found one of 2" in told
+    assert "dask worker --nthreads 1" in told

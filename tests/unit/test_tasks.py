@@ -200,13 +200,19 @@ def test_who_asks_processes_of_which_one_has_died_gets_others() -> None:
         workers.stop()
 
 
-def test_tasks_that_wait_for_nothing_run_at_once(tmp_path: Path) -> None:
-    """And share the threads; what waits alone gets all of them."""
+@pytest.mark.parametrize(
+    ("widest", "shares"), [(4, [[4], [1, 1, 2], [4]]), (1, [[1], [1, 1, 1], [1]])]
+)
+def test_tasks_that_wait_for_nothing_run_at_once(
+    tmp_path: Path, widest: int, shares: list[list[int]]
+) -> None:
+    """And share the threads; what waits alone gets all of them, or of its machine in a cluster."""
 
     class Counting:
-        most, threads = 4, 4
+        most, threads, are_here = 4, 4, True
 
         def __init__(self) -> None:
+            self.widest = widest
             self.shares: list[list[int]] = []
             self.open: list[Future[Any]] = []
 
@@ -231,7 +237,7 @@ def test_tasks_that_wait_for_nothing_run_at_once(tmp_path: Path) -> None:
     whole = task("whole", lambda found: sum(found), parts, version=1)
     counting = Counting()
     run_all(Cache(tmp_path), {"room": (whole,)}, counting)
-    assert counting.shares == [[4], [1, 1, 2], [4]]
+    assert counting.shares == shares
 
 
 def test_what_little_depends_on_runs_where_cores_idle(tmp_path: Path) -> None:
@@ -240,7 +246,7 @@ def test_what_little_depends_on_runs_where_cores_idle(tmp_path: Path) -> None:
     starts: list[tuple[str, int]] = []
 
     class Two:
-        most, threads = 2, 2
+        most, threads, widest, are_here = 2, 2, 2, True
 
         def __init__(self) -> None:
             self.open: list[Future[Any]] = []
