@@ -19,10 +19,3 @@ Loop = TypeVar("Loop", bound=Callable[..., object])
 def compiled(loop: Loop) -> Loop:
     """Compile a function of arrays and numbers; IEEE arithmetic, nothing reordered."""
     return cast("Loop", numba.njit(cache=True, nogil=True, error_model="numpy")(loop))
-
-
-def inlined(loop: Loop) -> Loop:
-    """Compile a small function into those that call it."""
-    return cast(
-        "Loop", numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")(loop)
-    )

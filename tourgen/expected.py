@@ -15,6 +15,8 @@ _SECONDS = {
     "tiles": 0.04, "unwrap": 0.55, "floors": 0.1, "colors": 0.12, "bake": 0.45, "inferred": 0.05,
     "pack": 0.08, "poster": 0.15, "measure": 0.08,
 }  # fmt: skip
+#: Seconds below which small scans do not bring them: pictures of one size, and a fixed search.
+_LEAST_S = {"ownership": 5.0, "poster": 3.0, "floors": 2.0, "register": 1.0, "exposure": 1.0}
 #: Stages that are given the whole scan: those after them see what is left of crowded points.
 _OF_THE_WHOLE = {"scan", "stations", "ownership"}
 _LEFT_MB = 240.0
@@ -57,7 +59,7 @@ def expected_s(name: str, scan_mb: float) -> float:
     growth = _GROWTH if stage in _SLOWLY_GROWING else 1.0
     times = _given_mb(stage, scan_mb) / _USUAL_MB
     seconds = _SECONDS.get(stage, 0.02) * _USUAL_MB * pow(times, growth)
-    return seconds / parts_of(name)
+    return max(seconds, _LEAST_S.get(stage, 0.0)) / parts_of(name)
 
 
 def expected_mb(name: str, scan_mb: float) -> float:

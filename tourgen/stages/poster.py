@@ -17,11 +17,12 @@ from tourgen.compiled import compiled
 from tourgen.errors import StageError
 from tourgen.geometry import Float32, TexturedMesh, UInt8, View
 from tourgen.rays import rays_of
+from tourgen.threads import in_parts
 
 VERSION = 5
 
 _SAMPLES = 2  # rays a pixel along each axis
-_ROWS_AT_ONCE = 128
+_ROWS_AT_ONCE = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,12 +98,14 @@ def poster(scene: Scene, view: View, settings: Settings) -> UInt8:
     directions = _directions(view, settings)
     eye = view.position.astype(np.float32)
     picture = np.empty((settings.height, settings.width, 3), np.float32)
-    for row in range(0, settings.height, _ROWS_AT_ONCE):
-        rows = slice(row, row + _ROWS_AT_ONCE)
-        fine = directions[row * _SAMPLES : (row + _ROWS_AT_ONCE) * _SAMPLES]
+
+    def draw(first: int, last: int) -> None:
+        fine = directions[first * _SAMPLES : last * _SAMPLES]
         colors = scene.look(eye, fine.reshape(-1, 3), settings.void)
-        shape = (len(fine) // _SAMPLES, _SAMPLES, settings.width, _SAMPLES, 3)
-        picture[rows] = colors.reshape(shape).mean((1, 3))
+        shape = (last - first, _SAMPLES, settings.width, _SAMPLES, 3)
+        picture[first:last] = colors.reshape(shape).mean((1, 3))
+
+    in_parts(draw, settings.height, _ROWS_AT_ONCE)
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 
@@ -124,12 +127,14 @@ def around(scene: Scene, view: View, settings: Settings) -> UInt8:
     elevation = np.pi / 2 - (np.arange(height) + 0.5) * (np.pi / height)
     eye = view.position.astype(np.float32)
     picture = np.empty((height, width, 3), np.float32)
-    for row in range(0, height, _ROWS_AT_ONCE):
-        rows = slice(row, row + _ROWS_AT_ONCE)
-        up, turn = np.meshgrid(elevation[rows], azimuth, indexing="ij")
+
+    def draw(first: int, last: int) -> None:
+        up, turn = np.meshgrid(elevation[first:last], azimuth, indexing="ij")
         ways = np.stack([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)], -1)
         colors = scene.look(eye, ways.astype(np.float32).reshape(-1, 3), settings.void)
-        picture[rows] = colors.reshape(-1, width, 3)
+        picture[first:last] = colors.reshape(-1, width, 3)
+
+    in_parts(draw, height, _ROWS_AT_ONCE)
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 
