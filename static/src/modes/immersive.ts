@@ -27,12 +27,13 @@ import type { Rooms } from "../rooms.ts";
 import { Marker } from "../scene/marker.ts";
 import type { Stage } from "../scene/stage.ts";
 import type { Link, Texts, Triple, View } from "../tour.ts";
+import { isFloor } from "../walk/collider.ts";
+import { EYE_M } from "../walk/walker.ts";
 
 const TURN_RAD = Math.PI / 6;
 /** A stick counts from the first on, and again once it fell below the second. */
 const STICK = [0.7, 0.3] as const;
 const REACH_M = 12;
-const FLOOR_MIN_RISE = 0.6;
 const SIGN_M = 0.22;
 const SIGN_WITHIN = 0.97;
 const VIGNETTE_S = 0.35;
@@ -44,7 +45,7 @@ export interface ImmersiveHost {
   readonly rooms: Rooms;
   text(texts: Texts): string;
   /** Brings everything but the picture up to the time. */
-  step(dt: number): void;
+  step(): void;
   /** Through a door. */
   pass(link: Link): void;
   /** The session is over; where one stood last. */
@@ -119,8 +120,8 @@ export class Immersive {
     stage.renderer.xr.enabled = false;
     stage.resume();
     ended.call(this.#host, {
-      position: [eye.x, eye.y, this.#feet.z + 1.6],
-      look_at: [ahead.x, ahead.y, this.#feet.z + 1.6],
+      position: [eye.x, eye.y, this.#feet.z + EYE_M],
+      look_at: [ahead.x, ahead.y, this.#feet.z + EYE_M],
     });
   }
 
@@ -137,7 +138,7 @@ export class Immersive {
     this.#vignette.position.copy(camera.position);
     this.#vignette.quaternion.copy(camera.quaternion);
     this.#vignette.translateZ(-0.3);
-    this.#host.step(dt);
+    this.#host.step();
   }
 
   // ------------------------------------------------------------------ hands
@@ -179,7 +180,7 @@ export class Immersive {
   #floorAt(space: XRTargetRaySpace): Vector3 | null {
     const { origin, direction } = rayOf(space);
     const hit = this.#host.rooms.collider?.cast(origin, direction, REACH_M);
-    return hit && hit.normal.z > FLOOR_MIN_RISE ? hit.point : null;
+    return hit && isFloor(hit) ? hit.point : null;
   }
 
   #doorAt(space: XRTargetRaySpace): Link | null {

@@ -6,7 +6,7 @@ import type { Rooms } from "../rooms.ts";
 import { Marker } from "../scene/marker.ts";
 import type { Stage } from "../scene/stage.ts";
 import type { Tools } from "../tools.ts";
-import type { Hit } from "../walk/collider.ts";
+import { isFloor, type Hit } from "../walk/collider.ts";
 import { Pointer } from "../walk/pointer.ts";
 import type { Walking } from "./walking.ts";
 import type { Ways } from "./ways.ts";
@@ -14,7 +14,6 @@ import type { Ways } from "./ways.ts";
 const ZOOM_STEP = 1.08;
 /** A click on a wall leads to the floor so far before it. */
 const BEFORE_WALL_M = 0.45;
-const FLOOR_MIN_RISE = 0.6;
 
 export interface PointingHost {
   readonly stage: Stage;
@@ -109,8 +108,4 @@ export class Pointing {
     if (floor) this.#marker.show(floor.point, floor.normal);
     if (floor || this.#marker.hide()) stage.draw();
   }
-}
-
-function isFloor(hit: Hit): boolean {
-  return hit.normal.z > FLOOR_MIN_RISE;
 }

@@ -23,6 +23,8 @@ const UP = new Vector3(0, 0, 1);
 /** A contact that pushes more up or down than this is floor or ceiling, not wall (sine of slope). */
 const WALL_MAX_RISE = 0.6;
 const PUSH_ROUNDS = 3;
+/** One can stand on what rises no more steeply than this, to whoever points at it (cosine of slope). */
+const FLOOR_MIN_RISE = 0.6;
 
 export class Collider {
   readonly #bvh: MeshBVH;
@@ -116,4 +118,9 @@ export class Collider {
     }
     return [px, py];
   }
+}
+
+/** Whether what a ray met is a floor. */
+export function isFloor({ normal }: Hit): boolean {
+  return normal.z > FLOOR_MIN_RISE;
 }
