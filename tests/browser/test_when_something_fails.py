@@ -32,6 +32,22 @@ def test_a_tile_that_fails_is_asked_for_again(visit: Visit) -> None:
     here.forgive("503", "Failed to load tile")
 
 
+def test_a_decoder_that_fails_is_asked_for_again(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.page.route("**/draco_decoder.wasm", lambda route: route.abort())
+    here.page.goto(f"{here.origin}/rooms/chamber1/index.html?levels=root")
+    notice = here.page.locator(".notice:not([hidden])")
+    notice.wait_for()
+    notice.get_by_role("button", name="Try again").click()
+    notice.wait_for()
+    here.page.unroute("**/draco_decoder.wasm")
+    notice.get_by_role("button", name="Try again").click()
+    here.wait("window.tourgen.ready")
+    here.settle()
+    assert here.stats["triangles"] > 0
+    here.forgive("draco_decoder.wasm", "ERR_FAILED", "Failed to load tile", "Failed to fetch")
+
+
 def test_a_lost_graphics_context_comes_back(visit: Visit) -> None:
     here = visit(size=ROOMY, reduced_motion="reduce")
     here.open("rooms/chamber1/index.html", levels="root")
