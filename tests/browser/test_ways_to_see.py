@@ -1,20 +1,12 @@
-"""Ways to see: orbit, dollhouse, plan, small map, guide, gamepad, headset."""
+"""Ways to see: orbit, dollhouse, plan, small map, guide, gamepad."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
-import pytest
 from published import rooms_of, tour_of
-from visitor import ROOMY, Vector, Visit, box_of
-
-NODE_MODULES = Path(__file__).parents[1] / "node_modules"
-
-
-def angle_between(one: Vector, other: Vector) -> float:
-    cosine = one @ other / np.linalg.norm(one) / np.linalg.norm(other)
-    return float(np.arccos(np.clip(cosine, -1, 1)))
+from visitor import ROOMY, Visit, box_of
 
 
 def test_signs_of_doors_are_whole_wherever_one_looks(site: Path, visit: Visit) -> None:
@@ -210,45 +202,3 @@ def test_a_gamepad_walks_looks_and_opens(site: Path, visit: Visit) -> None:
     here.page.evaluate("pad.buttons[0].pressed = true")
     here.panel.wait_for()
     assert here.panel.locator("h2").inner_text() == note["title"]["en"]
-
-
-def test_a_headset_shows_the_room_and_one_leaves_it_at_will(visit: Visit) -> None:
-    here = visit(size=ROOMY, reduced_motion="reduce")
-    here.page.add_init_script(path=NODE_MODULES / "iwer/build/iwer.min.js")
-    here.page.add_init_script(
-        "window.headset = new IWER.XRDevice(IWER.metaQuest3);"
-        "headset.installRuntime({ forceInstall: true });"
-    )
-    here.open("rooms/chamber1/index.html", levels="root")
-    here.settle()
-    before = here.position
-    here.use("Virtual reality")
-    here.wait("window.tourgen.isImmersed")
-    here.wait("window.tourgen.stats.frames > 5")
-    assert abs(here.position[2] - before[2]) < 0.5
-    heading = here.look
-    here.page.evaluate("headset.controllers.right.updateAxes('thumbstick', 1, 0)")
-    for _ in range(40):
-        here.page.wait_for_timeout(50)
-        if here.look @ heading < 0.95:
-            break
-    turned = np.degrees(angle_between(here.look[:2], heading[:2]))
-    assert turned == pytest.approx(30, abs=3), "one step, however long the stick is held"
-    here.page.evaluate("headset.controllers.right.updateAxes('thumbstick', 0, 0)")
-    here.page.evaluate(
-        "headset.controllers.right.position.set(0.2, 1.3, -0.2);"
-        "headset.controllers.right.quaternion.set(-0.38, 0, 0, 0.92);"
-        "headset.controllers.right.updateButtonValue('trigger', 1)"
-    )
-    here.page.wait_for_timeout(400)
-    stood = here.position
-    here.page.evaluate("headset.controllers.right.updateButtonValue('trigger', 0)")
-    for _ in range(40):
-        here.page.wait_for_timeout(50)
-        if np.linalg.norm(here.position - stood) > 0.4:
-            break
-    assert np.linalg.norm(here.position - stood) > 0.4, "to where one pointed"
-    here.page.evaluate("headset.controllers.right.updateButtonValue('squeeze', 1)")
-    here.wait("!window.tourgen.isImmersed")
-    here.settle()
-    assert abs(here.position[2] - before[2]) < 0.3

@@ -172,7 +172,7 @@ export class Immersive {
     const place = this.#floorAt(space);
     if (!place) return;
     const head = this.#host.stage.camera.getWorldPosition(new Vector3());
-    this.#feet.add(place.sub(head.setZ(place.z)).setZ(0)).setZ(place.z);
+    this.#feet.add(new Vector3().subVectors(place, head)).setZ(place.z);
     this.#place();
     this.#dark = 1;
   }
