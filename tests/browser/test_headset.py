@@ -123,3 +123,48 @@ def test_pointing_leads_on_on_a_floor_high_up(site: Path, visit: Visit) -> None:
     assert abs(here.position[2] - stood[2]) < 0.3
     emerge(here)
     assert abs(here.position[2] - stood[2]) < 0.3
+
+
+def test_of_a_session_that_is_over_nothing_stays(site: Path, visit: Visit) -> None:
+    here = wearing(visit)
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.settle()
+    left = []
+    for _ in range(2):
+        immerse(here)
+        emerge(here)
+        left.append([here.stats[kind] for kind in ("textures", "geometries")])
+    assert left[0] == left[1]
+    gone = next(
+        door["at"] for door in rooms_of(site)["chamber1"]["links"] if door["to"] == "chamber2"
+    )
+    here.page.locator(".door[data-to=stairs]").dispatch_event("click")
+    here.await_room("stairs")
+    immerse(here)
+    point(here, gone)
+    assert here.room == "stairs", "no door hangs there in this room"
+    emerge(here)
+
+
+def test_a_session_that_cannot_begin_leaves_the_room_as_it_was(visit: Visit) -> None:
+    here = wearing(visit)
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.settle()
+    before = here.position
+    here.page.evaluate(
+        "window.spaceOf = XRSession.prototype.requestReferenceSpace;"
+        "XRSession.prototype.requestReferenceSpace = () => Promise.reject(new Error('no floor'));"
+        "null"
+    )
+    here.use("Virtual reality")
+    here.page.locator(".notice:not([hidden])").wait_for()
+    assert not here.page.evaluate("Boolean(headset.activeSession)")
+    here.settle()
+    assert np.allclose(here.position, before, atol=0.01)
+    heading = here.look
+    here.page.keyboard.press("ArrowLeft", delay=300)
+    here.settle()
+    assert here.look @ heading < 0.99
+    here.page.evaluate("XRSession.prototype.requestReferenceSpace = window.spaceOf; null")
+    immerse(here)
+    emerge(here)

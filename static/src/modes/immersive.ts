@@ -21,6 +21,8 @@ import {
   Sprite,
   SpriteMaterial,
   Vector3,
+  type Material,
+  type Object3D,
   type XRTargetRaySpace,
 } from "three";
 import type { Rooms } from "../rooms.ts";
@@ -60,6 +62,8 @@ export class Immersive {
   readonly #signs = new Group();
   readonly #vignette = vignette();
   readonly #doors = new Map<Sprite, Link>();
+  /** Takes away what was added to each hand, which three.js hands out to the next session again. */
+  readonly #lettingGo: (() => void)[] = [];
   #pointing: XRTargetRaySpace | null = null;
   #stickIsOut = false;
   #dark = 0;
@@ -104,10 +108,16 @@ export class Immersive {
     renderer.xr.setReferenceSpaceType("local-floor");
     this.#rig.add(camera, this.#vignette);
     scene.add(this.#rig, this.#marker.group, this.#signs);
-    for (const hand of [0, 1]) this.#rig.add(this.#controller(hand));
-    this.#session.addEventListener("end", () => this.#close());
+    for (const hand of [0, 1]) this.#hold(hand);
     stage.pauseFor((now) => this.#frame(now));
-    await renderer.xr.setSession(this.#session);
+    try {
+      await renderer.xr.setSession(this.#session);
+    } catch (error) {
+      await this.#session.end().catch(() => undefined); // it may be over already
+      this.#leave();
+      throw error;
+    }
+    this.#session.addEventListener("end", () => this.#close());
     this.stand(feet, yaw);
   }
 
@@ -115,14 +125,23 @@ export class Immersive {
     const { stage, ended } = this.#host;
     const eye = stage.camera.getWorldPosition(new Vector3());
     const ahead = stage.camera.getWorldDirection(new Vector3()).add(eye);
-    stage.scene.remove(this.#rig, this.#marker.group, this.#signs);
-    this.#rig.remove(stage.camera);
-    stage.renderer.xr.enabled = false;
-    stage.resume();
+    this.#leave();
     ended.call(this.#host, {
       position: [eye.x, eye.y, this.#feet.z + EYE_M],
       look_at: [ahead.x, ahead.y, this.#feet.z + EYE_M],
     });
+  }
+
+  /** Gives camera, hands and loop back, and frees what was for this session alone. */
+  #leave(): void {
+    const { stage } = this.#host;
+    const own = [this.#rig, this.#marker.group, this.#signs];
+    this.#rig.remove(stage.camera);
+    stage.scene.remove(...own);
+    for (const each of own) free(each);
+    for (const letGo of this.#lettingGo) letGo();
+    stage.renderer.xr.enabled = false;
+    stage.resume();
   }
 
   #frame(now: number): void {
@@ -143,18 +162,26 @@ export class Immersive {
 
   // ------------------------------------------------------------------ hands
 
-  #controller(hand: number): XRTargetRaySpace {
+  #hold(hand: number): void {
     const space = this.#host.stage.renderer.xr.getController(hand);
     const points = [new Vector3(0, 0, 0), new Vector3(0, 0, -3)];
     const ray = new Line(
       new BufferGeometry().setFromPoints(points),
       new LineBasicMaterial({ color: 0xffffff, transparent: true, opacity: 0.6 }),
     );
+    const heard = {
+      selectstart: () => void (this.#pointing = space),
+      selectend: () => this.#go(space),
+      squeezestart: () => this.end(),
+    };
+    const kinds = ["selectstart", "selectend", "squeezestart"] as const;
+    this.#rig.add(space);
     space.add(ray);
-    space.addEventListener("selectstart", () => (this.#pointing = space));
-    space.addEventListener("selectend", () => this.#go(space));
-    space.addEventListener("squeezestart", () => this.end());
-    return space;
+    for (const kind of kinds) space.addEventListener(kind, heard[kind]);
+    this.#lettingGo.push(() => {
+      space.remove(ray);
+      for (const kind of kinds) space.removeEventListener(kind, heard[kind]);
+    });
   }
 
   /** Shows where one would go. */
@@ -222,6 +249,7 @@ export class Immersive {
   // ------------------------------------------------------------------ signs
 
   #showSigns(): void {
+    free(this.#signs);
     this.#signs.clear();
     this.#doors.clear();
     const { room } = this.#host.rooms;
@@ -264,6 +292,15 @@ function signOf(text: string, at: Triple): Sprite {
   sign.position.set(...at);
   sign.scale.set((SIGN_M * canvas.width) / canvas.height, SIGN_M, 1);
   return sign;
+}
+
+/** Frees what the graphics card holds of all below; the shape of signs is shared by all there are. */
+function free(root: Object3D): void {
+  root.traverse((object) => {
+    if (object instanceof Sprite) object.material.map?.dispose();
+    if (object instanceof Mesh || object instanceof Line) object.geometry.dispose();
+    if ("material" in object) (object.material as Material).dispose();
+  });
 }
 
 /** A dark rim before the eyes, clear in the middle. */
