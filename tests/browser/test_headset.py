@@ -16,6 +16,16 @@ EYE_M = 1.6
 HAND_M = (0.0, 1.3, -0.2)
 """Where the right hand is held: to the right, up and back of the feet."""
 
+HALTED = """
+const soon = window.requestAnimationFrame.bind(window);
+window.requestAnimationFrame = (act) => {
+  const isHeadset = String(act).includes("deviceFrameHandle");
+  const then = (now) => (!isHeadset && window.tourgen?.isImmersed ? soon(then) : act(now));
+  return soon(then);
+};
+"""
+"""The window draws nothing while a headset does, as in one that stands alone."""
+
 
 def wearing(visit: Visit) -> Visitor:
     """A visitor with a headset at hand."""
@@ -123,6 +133,20 @@ def test_pointing_leads_on_on_a_floor_high_up(site: Path, visit: Visit) -> None:
     assert abs(here.position[2] - stood[2]) < 0.3
     emerge(here)
     assert abs(here.position[2] - stood[2]) < 0.3
+
+
+def test_a_headset_that_halts_the_window_shows_the_next_room(site: Path, visit: Visit) -> None:
+    here = wearing(visit)
+    here.page.add_init_script(HALTED)
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.settle()
+    immerse(here)
+    doors = rooms_of(site)["chamber1"]["links"]
+    point(here, next(door["at"] for door in doors if door["to"] == "stairs"))
+    here.await_room("stairs")
+    assert here.page.evaluate("window.tourgen.isImmersed")
+    emerge(here)
+    assert here.room == "stairs"
 
 
 def test_of_a_session_that_is_over_nothing_stays(site: Path, visit: Visit) -> None:

@@ -26,6 +26,7 @@ import {
   type XRTargetRaySpace,
 } from "three";
 import type { Rooms } from "../rooms.ts";
+import { goBy } from "../scene/frames.ts";
 import { Marker } from "../scene/marker.ts";
 import type { Stage } from "../scene/stage.ts";
 import type { Link, Texts, Triple, View } from "../tour.ts";
@@ -117,6 +118,7 @@ export class Immersive {
       this.#leave();
       throw error;
     }
+    goBy(this.#session);
     this.#session.addEventListener("end", () => this.#close());
     this.stand(feet, yaw);
   }
@@ -136,6 +138,7 @@ export class Immersive {
   #leave(): void {
     const { stage } = this.#host;
     const own = [this.#rig, this.#marker.group, this.#signs];
+    goBy(null);
     this.#rig.remove(stage.camera);
     stage.scene.remove(...own);
     for (const each of own) free(each);

@@ -26,6 +26,7 @@ import {
 import type { Files } from "../files.ts";
 import { Collider } from "../walk/collider.ts";
 import { Backoff } from "./backoff.ts";
+import { onNextFrame } from "./frames.ts";
 import { boxOf, checkerboard, type Levels } from "./levels.ts";
 import { tinted } from "./tint.ts";
 
@@ -239,7 +240,7 @@ export class RoomTiles {
     if (tile.parent === null && !this.#rootShown) {
       this.#rootShown = true;
       // It is drawn while its walls are made ready.
-      requestAnimationFrame(() => setTimeout(() => this.#events.root(colliderOf(scene))));
+      onNextFrame(() => setTimeout(() => this.#events.root(colliderOf(scene))));
     }
     this.#touch();
   }
