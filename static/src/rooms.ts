@@ -102,7 +102,7 @@ export class Rooms {
     this.#tiles = this.tilesOf(room, this.#levels, {
       changed: () => now(() => this.#stage.draw()),
       progress: (part) => now(() => this.#front.cover.progress(part)),
-      root: (collider) => now(() => this.#open(room, view, collider)),
+      root: (collider) => now(() => this.#open(room, view, collider())),
       failed: () => now(() => this.#fail(room, view)),
       partFailed: () => now(() => this.#tellPartMissing()),
     });

@@ -90,7 +90,7 @@ export class Scenery {
         changed: () => undefined,
         progress: () => undefined,
         root: (collider) => {
-          this.#collider = collider;
+          this.#collider = collider();
         },
         failed: lose,
         partFailed: lose,

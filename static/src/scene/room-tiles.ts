@@ -45,8 +45,12 @@ export interface RoomEvents {
   changed(): void;
   /** Bytes of the root tile that have come, 0 to 1. */
   progress(part: number): void;
-  /** The root tile is there: the room can be shown and walked. */
-  root(collider: Collider): void;
+  /**
+   * The root tile is there: the room can be shown, and walked.
+   *
+   * @param collider Makes what one walks against, which takes a while: only for whoever walks.
+   */
+  root(collider: () => Collider): void;
   /** Nothing of the room can be shown. */
   failed(): void;
   /** A tile below the root stays missing however often it is asked for; its parent stands in. */
@@ -240,7 +244,7 @@ export class RoomTiles {
     if (tile.parent === null && !this.#rootShown) {
       this.#rootShown = true;
       // It is drawn while its walls are made ready.
-      onNextFrame(() => setTimeout(() => this.#events.root(colliderOf(scene))));
+      onNextFrame(() => setTimeout(() => this.#events.root(() => colliderOf(scene))));
     }
     this.#touch();
   }
