@@ -95,7 +95,7 @@ export class Visit {
         this.#walking.walkThrough(link);
       },
       reached: (at) => this.#walking.face(new Vector3(...at)),
-      chosen: (next) => this.#journey.go(next, next.entry),
+      chosen: (next) => this.#journey.choose(next),
       noted: (of, note, lead) => this.#journey.open(of, note, lead),
       closed: () => this.#journey.closed(),
       see: (way) => void this.#ways.see(way),
@@ -191,7 +191,7 @@ export class Visit {
       home: files.home,
       address: () => journey.address(),
       immerse: () => void immersion.begin(),
-      open: (of, note) => (note ? journey.open(of, note, true) : journey.go(of, of.entry)),
+      open: (of, note) => (note ? journey.open(of, note, true) : journey.choose(of)),
     });
     this.#tools = tools;
     this.#pointing = new Pointing({ stage, front, rooms, walking, ways, tools, takeOver });

@@ -79,6 +79,19 @@ def test_search_finds_a_note_and_leads_before_it(site: Path, visit: Visit) -> No
     assert here.panel.locator("h2").inner_text() == "Telescope"
 
 
+def test_search_for_the_room_one_is_in_leaves_one_there(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.settle()
+    before = here.page.evaluate("[history.length, window.tourgen.stats.bytes]")
+    here.page.get_by_role("button", name="Search").click()
+    here.panel.locator("input").fill("chamber of the watch")
+    here.panel.locator(".found-item", has_text="Chamber of the watch").first.click()
+    here.panel.wait_for(state="hidden")
+    here.page.wait_for_timeout(500)
+    assert here.page.evaluate("[history.length, window.tourgen.stats.bytes]") == before
+
+
 def test_search_forgives_accents_and_a_wrong_letter(visit: Visit) -> None:
     here = visit(size=ROOMY, reduced_motion="reduce", locale="fr")
     here.open("rooms/chamber1/index.html", levels="root")

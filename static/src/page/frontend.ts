@@ -200,26 +200,23 @@ export class Frontend {
   }
 
   #listRooms(): void {
-    const items = this.#tour.rooms.map((room) => {
-      const isHere = room === this.#room;
-      return {
-        title: this.text(room.title),
-        href: this.#addresses.ofRoom(new URL(location.href), room.id),
-        poster: this.#files.source(room.poster),
-        isHere,
-        notes: room.notes.map((note) => ({
-          title: this.text(note.title),
-          open: () => {
-            this.panel.close();
-            this.#events.noted(room, note, true);
-          },
-        })),
-        choose: () => {
+    const items = this.#tour.rooms.map((room) => ({
+      title: this.text(room.title),
+      href: this.#addresses.ofRoom(new URL(location.href), room.id),
+      poster: this.#files.source(room.poster),
+      isHere: room === this.#room,
+      notes: room.notes.map((note) => ({
+        title: this.text(note.title),
+        open: () => {
           this.panel.close();
-          if (!isHere) this.#events.chosen(room);
+          this.#events.noted(room, note, true);
         },
-      };
-    });
+      })),
+      choose: () => {
+        this.panel.close();
+        this.#events.chosen(room);
+      },
+    }));
     this.panel.open(this.#words.rooms, roomsSheet(items));
   }
 

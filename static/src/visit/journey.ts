@@ -72,6 +72,11 @@ export class Journey {
     void rooms.enter(room, view, true);
   }
 
+  /** To a room that was chosen from a list, if one is not in it. */
+  choose(room: Room): void {
+    if (room !== this.#host.rooms.room) this.go(room, room.entry);
+  }
+
   /** Through a door. */
   pass(link: Link): void {
     const { rooms, tour } = this.#host;
