@@ -136,7 +136,6 @@ export class Visit {
       rooms,
       wish,
       isElsewhere: () => this.#ways.overview !== null || this.#immersion.isOn,
-      isLed: () => this.#guidance.guide?.isPlaying ?? false,
       pass: (link) => this.#journey.pass(link),
       aimed: () => this.#journey.recordAtRest(),
     });

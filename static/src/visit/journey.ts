@@ -153,7 +153,7 @@ export class Journey {
     const place = placeIn(location.hash);
     if (room !== rooms.room || !rooms.isOpen) return this.#enter(room, place, true);
     if (place.way !== ways.way) void ways.see(place.way);
-    if (place.view && isInside(room, place.view.position)) walking.visitor.jump(place.view);
+    if (place.view && isInside(room, place.view.position)) walking.jump(place.view);
     walking.aim();
     const note = place.note === null ? undefined : room.notes[place.note - 1];
     if (note && note !== this.#note) this.open(room, note, place.view === null);

@@ -1,6 +1,6 @@
 /** Walking: the picture as the visitor's eyes see it, and doors passed by walking up to them. */
 
-import { Vector3 } from "three";
+import type { Vector3 } from "three";
 import { prefersStillness } from "../dom.ts";
 import type { Frontend } from "../page/frontend.ts";
 import type { Rooms } from "../rooms.ts";
@@ -19,8 +19,6 @@ export interface WalkingHost {
   wish(): Wish;
   /** Whether something else than these eyes makes the picture: a view from outside, a headset. */
   isElsewhere(): boolean;
-  /** Whether one is led: doors on the way are not meant then. */
-  isLed(): boolean;
   /** One goes through a door. */
   pass(link: Link): void;
   /** One looks from elsewhere, or elsewhere to. */
@@ -56,12 +54,13 @@ export class Walking {
   /** Stands at another place of the room at once. */
   jump(view: View): void {
     this.visitor.jump(view);
+    this.#thresholds.disarm();
     this.aim();
   }
 
   /** Goes to another place of the room as a camera does, where there is a way; else at once. */
   glide(view: View, pace = 1): void {
-    if (prefersStillness() || !this.visitor.glide(view, pace)) this.visitor.jump(view);
+    if (prefersStillness() || !this.visitor.glide(view, pace)) return this.jump(view);
     this.aim();
   }
 
@@ -86,12 +85,19 @@ export class Walking {
   /** One step of time. Returns whether anything moved. */
   frame(dt: number): boolean {
     if (!this.#host.rooms.isOpen) return false;
+    const isBrought = this.visitor.isGliding;
     const moved = this.visitor.move(dt);
     const { feet } = this.visitor;
-    const door = moved && feet && !this.#host.isLed() ? this.#thresholds.passed(feet) : null;
-    if (door) this.#host.pass(door);
+    if (isBrought) this.#thresholds.disarm(); // doors on the way are not meant
+    else if (moved && feet) this.#pass(feet);
     if (moved) this.aim();
     return moved;
+  }
+
+  /** Goes through the door that feet came to, if there is one. */
+  #pass(feet: Vector3): void {
+    const door = this.#thresholds.passed(feet);
+    if (door) this.#host.pass(door);
   }
 
   /** Looks through the visitor's eyes. */

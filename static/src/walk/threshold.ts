@@ -19,6 +19,11 @@ export class Thresholds<T extends { readonly at: Triple }> {
     this.#armed = new Set();
   }
 
+  /** Someone was brought to wherever they are: it counts as their arrival. */
+  disarm(): void {
+    this.#armed.clear();
+  }
+
   /** The door that someone standing at `feet` passes, or null. */
   passed(feet: Vector3): T | null {
     for (const door of this.#doors) {

@@ -72,6 +72,11 @@ export class Visitor {
     return this.#glide !== null || this.#errand !== null;
   }
 
+  /** Whether one is brought somewhere as a camera is, wherever the way leads. */
+  get isGliding(): boolean {
+    return this.#glide !== null;
+  }
+
   /** Looks into a room that is not there yet. */
   wait(view: View): void {
     this.stop();
