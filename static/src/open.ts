@@ -83,7 +83,8 @@ export async function open(
     return openKiosk(host, canvas, files, addresses, tour, room, kioskSettings(kiosk));
   }
   const [{ Visit }] = await Promise.all([import("./visit.ts"), spoken]);
-  const manner = { kiosk: false, language, opened: () => undefined, home: () => undefined };
+  const nothing = (): void => undefined;
+  const manner = { kiosk: false, language, opened: nothing, played: nothing, home: nothing };
   const visit = await Visit.of(host, canvas, files, addresses, tour, room, manner);
   visit.start(found === null);
   if (files.home) takeAlongInTime(files.home, tour);

@@ -33,6 +33,8 @@ export interface Manner {
   readonly language: string;
   /** Told of each room that opens. */
   opened(room: Room): void;
+  /** Told as long as a gamepad is used: the page hears nothing of it. */
+  played(): void;
   /** Back to the start was chosen. */
   home(): void;
 }
@@ -119,17 +121,19 @@ export class Visit {
       wanted: (next, view) => this.#journey.go(next, view),
     });
     this.#rooms = rooms;
-    this.#keyboard = new Keyboard(window, () => this.#walking.act(() => this.#takeOver()));
+    const walks = (): void => this.#walking.act(() => this.#takeOver());
+    this.#keyboard = new Keyboard(window, walks);
     this.#gamepads = new Gamepads(
       {
-        act: () => front.spots.nearest(AIM_PX)?.click(),
+        pushed: walks,
+        act: () => this.#actAhead(),
         back: () => front.panel.close(),
         previous: () => this.#guidance.guide?.step(-1),
         next: () => this.#guidance.guide?.step(1),
       },
       () => stage.wake(),
     );
-    const wish = (): Wish => this.#gamepads.wish() ?? this.#keyboard.wish();
+    const wish = (): Wish => this.#gamepads.wish ?? this.#keyboard.wish();
     const walking = new Walking({
       stage,
       front,
@@ -253,15 +257,27 @@ export class Visit {
 
   // ------------------------------------------------------------------ of all parts
 
+  /** Whether the tour shows itself, and there is no visitor yet. */
+  get #attracts(): boolean {
+    return this.#guidance.guide?.attracts ?? false;
+  }
+
+  /** Does what the sign before one is for, if it can be seen. */
+  #actAhead(): void {
+    if (!this.#attracts && this.#ways.way !== "plan") this.front.spots.nearest(AIM_PX)?.click();
+  }
+
   /** The visitor acts: whatever moves by itself leaves off. */
   #takeOver(): void {
     const { visitor } = this.#walking;
+    if (this.#attracts) return;
     this.#guidance.guide?.pause();
     if (visitor.isUnderWay) visitor.stop();
   }
 
   /** One step of the loop. */
   #frame(dt: number): Pace {
+    if (this.#gamepads.poll()) this.#manner.played();
     const moved = this.#ways.frame(dt);
     const { tiles } = this.#rooms;
     tiles?.update(this.#stage.camera, this.#stage.size);

@@ -9,6 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from playwright.sync_api import Page
 from visitor import Visit, Visitor
@@ -145,6 +146,38 @@ def test_whoever_is_still_there_goes_on(kiosk: Kiosk) -> None:
     here.page.get_by_role("button", name="Go on").click()
     assert state(here.page) == "visit"
     leave_alone(here, IDLE_S - 5)
+    assert state(here.page) == "visit"
+
+
+def test_whoever_uses_a_gamepad_is_still_there(kiosk: Kiosk) -> None:
+    here = kiosk()
+    here.page.evaluate(
+        "window.pad = { connected: true, axes: [0, 0, 0, 0],"
+        "  buttons: Array.from({ length: 17 }, () => ({ pressed: false })) };"
+        "navigator.getGamepads = () => [pad];"
+        "window.dispatchEvent(new Event('gamepadconnected'))"
+    )
+
+    def push() -> None:
+        for turn in (1, 0):
+            here.page.evaluate(f"pad.axes[2] = {turn}")
+            leave_alone(here, 0.2)
+
+    before = here.position
+    push()
+    assert state(here.page) == "attract"
+    for _ in range(4):
+        leave_alone(here, 10)
+        here.wait("window.tourgen.ready")
+    assert np.linalg.norm(here.position - before) > 0.1, "it goes on attracting"
+    begin(here)
+    leave_alone(here, IDLE_S - 5)
+    push()
+    leave_alone(here, IDLE_S - 5)
+    assert state(here.page) == "visit"
+    leave_alone(here, 10)
+    assert state(here.page) == "warning"
+    push()
     assert state(here.page) == "visit"
 
 

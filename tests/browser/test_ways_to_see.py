@@ -202,3 +202,22 @@ def test_a_gamepad_walks_looks_and_opens(site: Path, visit: Visit) -> None:
     here.page.evaluate("pad.buttons[0].pressed = true")
     here.panel.wait_for()
     assert here.panel.locator("h2").inner_text() == note["title"]["en"]
+
+
+def test_a_gamepad_takes_over_from_the_guide_on_the_way(visit: Visit) -> None:
+    here = visit(size=ROOMY)
+    here.page.add_init_script(PAD)
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.page.evaluate("window.dispatchEvent(new Event('gamepadconnected'))")
+    here.page.get_by_role("button", name="Guided tour").click()
+    guide = here.page.locator(".guide")
+    guide.wait_for()
+    here.page.evaluate("pad.buttons[5].pressed = true")
+    here.wait("document.querySelector('.guide-count').textContent.startsWith('2 ')")
+    here.page.evaluate("pad.axes[2] = 1")
+    guide.get_by_role("button", name="Play").wait_for()
+    here.page.evaluate("pad.axes[2] = 0")
+    here.page.evaluate(TWO_FRAMES)
+    stood = here.position
+    here.page.wait_for_timeout(1000)
+    assert np.allclose(here.position, stood, atol=0.01)

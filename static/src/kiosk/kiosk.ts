@@ -95,6 +95,11 @@ export class Kiosk {
     this.#visits.entered(room.id, this.#front.language, new Date());
   }
 
+  /** Told as long as a gamepad is used. */
+  played(): void {
+    this.#touched(false);
+  }
+
   /** Everything as if nobody had been here. */
   home(): void {
     this.#attract();

@@ -23,6 +23,7 @@ export async function openKiosk(
     kiosk: true,
     language,
     opened: (of) => kiosk.opened(of),
+    played: () => kiosk.played(),
     home: () => kiosk.home(),
   });
   const kiosk = new Kiosk(host, files, tour, settings, visit);

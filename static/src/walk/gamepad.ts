@@ -8,6 +8,8 @@ const REST = 0.16;
 const BUTTONS = { act: 0, back: 1, run: 10, previous: 4, next: 5 } as const;
 
 export interface GamepadEvents {
+  /** A stick is pushed, after both were at rest. */
+  pushed(): void;
   /** Through the door, or to the note, that one looks at. */
   act(): void;
   back(): void;
@@ -18,6 +20,7 @@ export interface GamepadEvents {
 export class Gamepads {
   readonly #events: GamepadEvents;
   readonly #held = new Set<string>();
+  #wish: Wish | null = null;
 
   /** @param wake Called when one comes, so that it is looked at. */
   constructor(events: GamepadEvents, wake: () => void) {
@@ -30,20 +33,19 @@ export class Gamepads {
     return this.#pad() !== null;
   }
 
-  /** What it asks for; null while it lies still. */
-  wish(): Wish | null {
+  /** What it asked for when it was looked at last; null while its sticks are at rest. */
+  get wish(): Wish | null {
+    return this.#wish;
+  }
+
+  /** Looks at it, once a frame: it sends no events. Returns whether it is in somebody's hands. */
+  poll(): boolean {
     const pad = this.#pad();
-    if (!pad) return null;
-    this.#press(pad);
-    const [leftX, leftY, rightX, rightY] = pad.axes.map(beyondRest);
-    const wish = {
-      ahead: -(leftY ?? 0),
-      left: -(leftX ?? 0),
-      turn: -(rightX ?? 0),
-      up: -(rightY ?? 0),
-      fast: pad.buttons[BUTTONS.run]?.pressed ?? false,
-    };
-    return wish.ahead || wish.left || wish.turn || wish.up ? wish : null;
+    const wasAtRest = this.#wish === null;
+    this.#wish = pad && wishOf(pad);
+    if (this.#wish && wasAtRest) this.#events.pushed();
+    if (pad) this.#press(pad);
+    return this.#wish !== null || (pad?.buttons.some(({ pressed }) => pressed) ?? false);
   }
 
   #pad(): Gamepad | null {
@@ -61,6 +63,18 @@ export class Gamepads {
       }
     }
   }
+}
+
+function wishOf(pad: Gamepad): Wish | null {
+  const [leftX, leftY, rightX, rightY] = pad.axes.map(beyondRest);
+  const wish = {
+    ahead: -(leftY ?? 0),
+    left: -(leftX ?? 0),
+    turn: -(rightX ?? 0),
+    up: -(rightY ?? 0),
+    fast: pad.buttons[BUTTONS.run]?.pressed ?? false,
+  };
+  return wish.ahead || wish.left || wish.turn || wish.up ? wish : null;
 }
 
 function beyondRest(value: number): number {
