@@ -23,7 +23,7 @@ const UP = new Vector3(0, 0, 1);
 /** A contact that pushes more up or down than this is floor or ceiling, not wall (sine of slope). */
 const WALL_MAX_RISE = 0.6;
 const PUSH_ROUNDS = 3;
-/** One can stand on what rises no more steeply than this, to whoever points at it (cosine of slope). */
+/** A surface whose normal points up less than this is no place to walk to (cosine of its slope). */
 const FLOOR_MIN_RISE = 0.6;
 
 export class Collider {
