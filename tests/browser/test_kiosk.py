@@ -358,3 +358,18 @@ def test_a_room_that_does_not_come_is_asked_for_again(kiosk: Kiosk) -> None:
     assert state(here.page) == "attract"
     here.await_room("chamber1")
     here.forgive("stairs", "ERR_FAILED", "Failed to fetch")
+
+
+def test_the_first_room_is_asked_for_again_while_nobody_is_there(visit: Visit) -> None:
+    here = visit(size=SIZE, reduced_motion="reduce")
+    here.page.clock.install(time=datetime(2026, 7, 6, 12))
+    asked: list[str] = []
+    here.page.route("**/chamber1/**/*.glb", lambda route: (asked.append("tile"), route.abort()))
+    here.page.goto(f"{here.origin}/kiosk.html?levels=root")
+    here.page.locator(".notice.grave:not([hidden])").wait_for(state="attached")
+    here.page.unroute("**/chamber1/**/*.glb")
+    assert asked
+    leave_alone(here, 7)
+    here.await_room("chamber1")
+    assert state(here.page) == "attract"
+    here.forgive("chamber1", "ERR_FAILED", "Failed to fetch")

@@ -220,8 +220,25 @@ def test_a_drag_that_begins_on_a_sign_turns_and_opens_nothing(
     look = here.look
     with press(here) as move:
         move(DRAG_PX / 2, 0)
+        here.settle()  # the sign has followed, and lies under what is lifted
     here.settle()
     assert off_by(here, here.position + look) < -0.2
+    assert here.room == "chamber1"
+
+
+def test_a_finger_that_draws_a_sign_aside_a_little_opens_nothing(site: Path, visit: Visit) -> None:
+    """So little that the browser still calls it a tap."""
+    here = visit(size=SIZE, has_touch=True)
+    here.open("rooms/chamber1/index.html")
+    here.teleport(here.position, link(site, "chamber1", "chamber2")["at"])
+    here.page.locator(".door[data-to=chamber2]:not(.away)").wait_for()
+    look = here.look
+    with finger(here) as move:
+        move(12, 0)
+        here.settle()
+    here.page.wait_for_timeout(500)
+    here.settle()
+    assert off_by(here, here.position + look) < -0.01
     assert here.room == "chamber1"
 
 

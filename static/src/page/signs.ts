@@ -3,6 +3,7 @@
 import { element, icon, ICONS } from "../dom.ts";
 import type { Spot } from "./hotspots.ts";
 import type { Link, Note, Triple } from "../tour.ts";
+import { isDrag } from "../walk/pointer.ts";
 
 const DOOR_FADE_M = [9, 18] as const;
 const NOTE_FADE_M = [4, 8] as const;
@@ -37,15 +38,21 @@ export function noteSpot(note: Note, title: string, open: () => void, events: Si
 
 /**
  * A finger that lifts from a button clicks it: of a tap that follows two fingers Chromium makes no
- * click now and then.
+ * click now and then. One that drags does not: the sign follows it as the view turns, and a touch ends
+ * where it began, whoever has captured its pointer.
  */
 function clickByTouch(button: HTMLButtonElement): void {
+  let press: PointerEvent | null = null;
+  button.addEventListener("pointerdown", (event) => (press = event));
+  button.addEventListener("pointermove", (event) => {
+    if (press?.pointerId === event.pointerId && isDrag(press, event)) press = null;
+  });
   button.addEventListener("touchend", (event) => {
     const touch = event.changedTouches[0];
     if (!touch || !event.cancelable || event.touches.length > 0) return;
     if (!button.contains(document.elementFromPoint(touch.clientX, touch.clientY))) return;
-    event.preventDefault(); // or it would click twice
-    button.click();
+    event.preventDefault(); // or it would click twice, or of so short a drag that a browser sees a tap
+    if (press) button.click();
   });
 }
 

@@ -76,7 +76,7 @@ export class Pointer {
     const press = this.#onSign;
     if (press?.pointerId !== event.pointerId) return;
     if (event.buttons === 0) this.#onSign = null;
-    else if (Math.hypot(event.x - press.x, event.y - press.y) > CLICK_SLOP_PX) {
+    else if (isDrag(press, event)) {
       this.#onSign = null;
       this.#press(press);
     }
@@ -139,6 +139,11 @@ export class Pointer {
     }
     return [x, y];
   }
+}
+
+/** Whether a pointer has come too far from where it was pressed for a click. */
+export function isDrag(press: PointerEvent, now: PointerEvent): boolean {
+  return Math.hypot(now.x - press.x, now.y - press.y) > CLICK_SLOP_PX;
 }
 
 function unit(value: number): number {
