@@ -80,7 +80,7 @@ export class Guidance {
     const { rooms, stage, tour, walking, ways } = this.#host;
     const room = roomCalled(tour, stop.room);
     if (!room) return;
-    if (room !== rooms.room) this.#host.go(room, stop);
+    if (room !== rooms.room || rooms.hasFailed) this.#host.go(room, stop);
     else if (rooms.isOpen) {
       ways.leave();
       walking.glide(stop, this.#guide?.attracts ? UNHURRIED : 1);
