@@ -169,18 +169,16 @@ export class Rooms {
 
   #fail(room: Room, view: View): void {
     this.#phase = "failed";
-    const { words } = this.#front;
-    const ways: Action[] = [{ label: words.retry, act: () => void this.enter(room, view, true) }];
+    const ways: Action[] = [{ label: "retry", act: () => void this.enter(room, view, true) }];
     const start = startOf(this.#tour);
     if (room !== start) {
-      ways.push({ label: words.back, act: () => this.#events.wanted(start, start.entry) });
+      ways.push({ label: "back", act: () => this.#events.wanted(start, start.entry) });
     }
-    this.#front.notice.tell(words.noRoom, ways, true);
+    this.#front.notice.tell({ says: "noRoom", ways, grave: true });
   }
 
   #tellPartMissing(): void {
-    const { words } = this.#front;
-    const retry = { label: words.retry, act: () => this.#tiles?.retry() };
-    this.#front.notice.tell(words.partMissing, [retry]);
+    const ways: Action[] = [{ label: "retry", act: () => this.#tiles?.retry() }];
+    this.#front.notice.tell({ says: "partMissing", ways });
   }
 }

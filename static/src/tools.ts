@@ -3,6 +3,7 @@
 import type { Raycaster } from "three";
 import { bytesOf, canTakeAlong, takeAlong } from "./along/along.ts";
 import type { Frontend } from "./page/frontend.ts";
+import type { Action } from "./page/notice.ts";
 import type { Tool } from "./page/sheets.ts";
 import type { Rooms } from "./rooms.ts";
 import type { Stage } from "./scene/stage.ts";
@@ -202,9 +203,9 @@ export class Tools {
     this.#isTinted = !this.#isTinted;
     setTint(this.#isTinted);
     front.panel.close();
-    const end = { label: front.words.close, act: () => this.#toggleTint() };
-    if (this.#isTinted) front.notice.tell(front.words.tinted, [end]);
-    else front.notice.clear();
+    const ways: Action[] = [{ label: "close", act: () => this.#toggleTint() }];
+    if (this.#isTinted) front.notice.tell({ says: "tinted", ways, lasts: true });
+    else front.notice.withdraw("tinted");
     stage.draw();
   }
 
@@ -230,19 +231,24 @@ export class Tools {
 
   async #takeAlong(): Promise<void> {
     const { front, home } = this.#host;
-    const { words } = front;
     if (!home) return;
     front.panel.close();
-    const share = new Intl.NumberFormat(mannerOf(front.language), { style: "percent" });
-    const progress = (part: number): void =>
-      front.notice.tell(words.takingAlong.replace("{}", share.format(part)), []);
+    let told = "";
+    const progress = (part: number): void => {
+      const share = new Intl.NumberFormat(mannerOf(front.language), { style: "percent" }).format(part);
+      if (share === told) return; // of most files nothing is to be read out
+      told = share;
+      front.notice.tell({ says: "takingAlong", of: share, lasts: true });
+    };
     try {
       progress(0);
       await takeAlong(home, progress);
-      front.notice.tellUntilClosed(words.along, words.close);
+      front.notice.tellUntilClosed("along", true);
     } catch (error) {
       console.warn(error);
-      front.notice.tellUntilClosed(words.notAlong, words.close);
+      front.notice.tellUntilClosed("notAlong", true);
+    } finally {
+      front.notice.withdraw("takingAlong");
     }
   }
 

@@ -199,9 +199,9 @@ export class Visit {
     this.#tools = tools;
     this.#pointing = new Pointing({ stage, front, rooms, walking, ways, tools, takeOver });
     front.canvas.addEventListener("webglcontextlost", () =>
-      front.notice.tell(front.words.contextLost, []),
+      front.notice.tell({ says: "contextLost", lasts: true }),
     );
-    front.canvas.addEventListener("webglcontextrestored", () => front.notice.clear());
+    front.canvas.addEventListener("webglcontextrestored", () => front.notice.withdraw("contextLost"));
     window.tourgen = answersOf({ stage, rooms, walking, ways, tools, immersion });
   }
 

@@ -68,6 +68,37 @@ def test_a_lost_graphics_context_comes_back(visit: Visit) -> None:
     here.forgive("CONTEXT_LOST", "Context Lost")
 
 
+def test_a_room_that_does_not_come_stays_told_whatever_else_is(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce", locale="en")
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.settle()
+    here.use("What was scanned")
+    notice = here.page.locator(".notice:not([hidden])")
+    assert "Orange" in notice.inner_text()
+    here.page.route("**/stairs/**/*.glb", lambda route: route.abort())
+    here.page.get_by_role("button", name="Rooms").click()
+    here.panel.get_by_role("link", name="Spiral stair").click()
+    here.page.locator(".notice.grave", has_text="could not be loaded").wait_for()
+    here.page.get_by_label("Language").select_option("fr")
+    here.page.locator(".notice.grave", has_text="n’a pas pu être chargée").wait_for()
+    here.page.evaluate(
+        "(() => { const gl = document.querySelector('canvas').getContext('webgl2');"
+        "window.graphics = gl.getExtension('WEBGL_lose_context');"
+        "window.restored = new Promise((done) =>"
+        " gl.canvas.addEventListener('webglcontextrestored', () => setTimeout(done)));"
+        "graphics.loseContext(); setTimeout(() => graphics.restoreContext(), 200); })()"
+    )
+    here.page.evaluate("window.restored")
+    assert here.page.locator(".notice.grave").is_visible()
+    here.page.unroute("**/stairs/**/*.glb")
+    notice.get_by_role("button", name="Réessayer").click()
+    here.await_room("stairs")
+    assert "Orange" in notice.inner_text(), "the picture is tinted still"
+    notice.get_by_role("button", name="Fermer").click()
+    assert notice.count() == 0
+    here.forgive("stairs", "ERR_FAILED", "Failed to", "CONTEXT_LOST", "Context Lost")
+
+
 def test_without_webgl_the_page_tells_all(visit: Visit) -> None:
     here = visit(size=ROOMY, reduced_motion="reduce")
     here.page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null;")

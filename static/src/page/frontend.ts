@@ -36,7 +36,7 @@ export interface FrontendEvents extends SignEvents {
 export class Frontend {
   readonly canvas: HTMLCanvasElement;
   readonly spots = new Hotspots();
-  readonly notice = new Notice();
+  readonly notice: Notice;
   readonly cover: Cover;
   readonly map: MiniMap;
   readonly panel: Panel;
@@ -78,6 +78,7 @@ export class Frontend {
     this.#language = language;
     this.#chosen = language;
     this.#words = wordsIn(language);
+    this.notice = new Notice(this.#words);
     this.cover = new Cover(host.querySelector("img") ?? element("img", { alt: "" }));
     this.panel = new Panel(() => events.closed());
     this.map = new MiniMap(tour, () => events.see("plan"));
@@ -130,7 +131,7 @@ export class Frontend {
     this.#room = room;
     this.#revealed = false;
     this.panel.close();
-    this.notice.clear();
+    this.notice.leave();
     this.spots.show([]);
     this.#say();
     const poster = this.#files.source(room.poster);
@@ -231,7 +232,6 @@ export class Frontend {
     this.#language = language;
     this.#words = wordsIn(language);
     this.panel.close();
-    this.notice.clear();
     this.#say();
     if (this.#revealed) this.showSigns();
     this.#events.language(language);
@@ -249,6 +249,7 @@ export class Frontend {
     this.#dock.say(words);
     this.map.say(words);
     this.panel.setWords(words.close);
+    this.notice.say(words);
     this.canvas.setAttribute("aria-label", words.view);
     this.spots.element.setAttribute("aria-label", words.doors);
     this.#sayHint();

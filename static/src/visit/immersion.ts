@@ -56,7 +56,7 @@ export class Immersion {
       );
     } catch (error) {
       console.warn(error);
-      front.notice.tellUntilClosed(front.words.noVr, front.words.close);
+      front.notice.tellUntilClosed("noVr");
     }
   }
 

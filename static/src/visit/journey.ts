@@ -49,8 +49,7 @@ export class Journey {
     const { front, rooms } = this.#host;
     const place = placeIn(location.hash);
     this.#then = () => {
-      const { noPage, close } = front.words;
-      if (isMissing || location.hash === "#missing") front.notice.tellUntilClosed(noPage, close);
+      if (isMissing || location.hash === "#missing") front.notice.tellUntilClosed("noPage");
     };
     this.#enter(rooms.room, place, false);
   }
@@ -137,7 +136,7 @@ export class Journey {
     const before = this.#then;
     this.#then = () => {
       before?.();
-      if (wrong) front.notice.tellUntilClosed(front.words.noView, front.words.close);
+      if (wrong) front.notice.tellUntilClosed("noView");
       const note = place.note === null ? undefined : room.notes[place.note - 1];
       if (note) this.open(room, note, place.view === null);
       if (place.way !== "walk") void ways.see(place.way);
