@@ -133,6 +133,24 @@ def begin_again(here: Visitor, language: str) -> None:
     begin(here, language)
 
 
+def test_who_touches_before_the_tour_shows_itself_is_not_led(visit: Visit) -> None:
+    here = visit(size=SIZE, reduced_motion="reduce")
+    here.page.clock.install(time=datetime(2026, 7, 6, 12))
+    held: list[Any] = []
+    here.page.route("**/viewer/guide-*.js", lambda route: held.append(route))
+    here.page.goto(f"{here.origin}/kiosk.html?levels=root")
+    here.wait("window.tourgen?.ready")
+    while not held:
+        here.page.wait_for_timeout(20)
+    begin(here)
+    stood = here.position
+    with here.page.expect_response("**/viewer/guide-*.js"):
+        held[0].continue_()
+    here.page.wait_for_timeout(500)
+    leave_alone(here, 20)
+    assert here.position.tolist() == stood.tolist()
+
+
 def test_whoever_is_still_there_goes_on(kiosk: Kiosk) -> None:
     here = kiosk()
     begin(here)

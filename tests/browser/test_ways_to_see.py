@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from published import rooms_of, tour_of
@@ -90,6 +91,30 @@ def test_the_plan_shows_where_one_is_and_leads_to_where_one_clicks(visit: Visit)
     plan.get_by_role("button", name="Level 1").click()
     plan.get_by_role("button", name="Chamber of the charts").click()
     here.await_room("chamber2")
+
+
+@pytest.mark.parametrize(("then", "see", "shown"), [
+    ("Plan", "plan", ".plan-sheet"),
+    ("Guided tour", "walk", ".guide"),
+    ("Walk", "walk", "#tour"),
+])  # fmt: skip
+def test_what_was_chosen_last_is_seen_however_late_its_script(
+    visit: Visit, then: str, see: str, shown: str
+) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    held: list[Any] = []
+    here.page.route("**/viewer/overview-*.js", lambda route: held.append(route))
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.page.get_by_role("button", name="Orbit", exact=True).click()
+    while not held:
+        here.page.wait_for_timeout(20)
+    here.page.get_by_role("button", name=then, exact=True).click()
+    here.page.locator(shown).wait_for()
+    with here.page.expect_response("**/viewer/overview-*.js"):
+        held[0].continue_()
+    here.page.wait_for_timeout(500)
+    assert here.page.evaluate("window.tourgen.see") == see
+    assert here.page.locator(shown).is_visible()
 
 
 def test_the_small_map_turns_up_where_one_walks(visit: Visit) -> None:

@@ -42,9 +42,10 @@ export class Guidance {
    */
   async lead(attracts = false): Promise<void> {
     if (this.#guide) return this.#guide.toggle();
-    const { Guide } = await import("../modes/guide.ts");
-    if (this.#guide) return;
     const { front, rooms, stage, tour, walking, ways } = this.#host;
+    const isWanted = ways.ask();
+    const { Guide } = await import("../modes/guide.ts");
+    if (!isWanted()) return;
     if (ways.way !== "walk") ways.leave();
     this.#guide = new Guide(
       {

@@ -34,6 +34,8 @@ export class Ways {
   #way: Way = "walk";
   #overview: Overview | null = null;
   #sheet: PlanSheet | null = null;
+  /** Counts what was asked for, so that what comes late for an earlier wish is known. */
+  #asked = 0;
 
   constructor(host: WaysHost) {
     this.#host = host;
@@ -48,23 +50,35 @@ export class Ways {
     return this.#overview;
   }
 
+  /**
+   * Asks for what may be a while on its way, instead of whatever else is.
+   *
+   * @returns Whether that is wanted still.
+   */
+  ask(): () => boolean {
+    const asked = ++this.#asked;
+    return () => asked === this.#asked;
+  }
+
   /** Sees in another way. */
   async see(way: Way): Promise<void> {
     const { front, rooms, stage, walking } = this.#host;
+    if (way === "walk" && this.#way === "walk") this.ask();
     if (way === this.#way || !rooms.isOpen) return;
     this.#host.takeOver();
-    const room = rooms.room;
     const before = this.#overview;
     if (way === "walk" && before) {
-      await before.land(room, walking.visitor.view);
-      if (before !== this.#overview) return;
+      const isWanted = this.ask();
+      await before.land(rooms.room, walking.visitor.view);
+      if (!isWanted()) return;
     }
     this.leave();
     if (way === "walk") return walking.aim();
     if (way === "plan") this.#showPlan();
     else {
+      const isWanted = this.ask();
       const { Overview } = await import("../modes/overview.ts");
-      if (room !== rooms.room || this.#overview) return;
+      if (!isWanted()) return;
       this.#overview = new Overview(
         {
           tour: this.#host.tour,
@@ -88,6 +102,7 @@ export class Ways {
   /** Takes away whatever stands between the visitor and walking. */
   leave(): void {
     const { front } = this.#host;
+    this.ask();
     this.#sheet?.element.remove();
     this.#sheet = null;
     if (this.#overview) {
