@@ -55,17 +55,13 @@ export async function open(
   const coming = fetchTour(files);
   if (files.home) askAhead(host, files);
   void bringWords(own); // most likely the tour's, too, which is not known yet
-  let tour;
-  try {
-    tour = await coming;
-  } catch (error) {
-    console.warn(error);
-    return give("noTour");
-  }
+  const tour = await arrived(coming);
+  if (!tour) return give("noTour");
   if (films) {
     const language = chooseLanguage(tour.languages, [asked]);
-    const [{ Film }] = await Promise.all([import("./film/film.ts"), bringWords(language)]);
-    new Film(host, files, tour, language);
+    const [script] = await Promise.all([arrived(import("./film/film.ts")), bringWords(language)]);
+    if (!script) return give("noTour");
+    new script.Film(host, files, tour, language);
     return;
   }
   const named = addresses.roomAt(new URL(location.href)) ?? host.dataset["room"] ?? null;
@@ -79,15 +75,27 @@ export async function open(
   const canvas = drawable();
   if (!canvas) return give("noWebgl");
   if (kiosk !== undefined) {
-    const { openKiosk } = await import("./kiosk/open.ts");
-    return openKiosk(host, canvas, files, addresses, tour, room, kioskSettings(kiosk));
+    const script = await arrived(import("./kiosk/open.ts"));
+    if (!script) return give("noTour");
+    return script.openKiosk(host, canvas, files, addresses, tour, room, kioskSettings(kiosk));
   }
-  const [{ Visit }] = await Promise.all([import("./visit.ts"), spoken]);
+  const [script] = await Promise.all([arrived(import("./visit.ts")), spoken]);
+  if (!script) return give("noTour");
   const nothing = (): void => undefined;
   const manner = { kiosk: false, language, opened: nothing, played: nothing, home: nothing };
-  const visit = await Visit.of(host, canvas, files, addresses, tour, room, manner);
+  const visit = await script.Visit.of(host, canvas, files, addresses, tour, room, manner);
   visit.start(found === null);
   if (files.home) takeAlongInTime(files.home, tour);
+}
+
+/** What was asked for; null where it does not come. */
+async function arrived<T>(coming: Promise<T>): Promise<T | null> {
+  try {
+    return await coming;
+  } catch (error) {
+    console.warn(error);
+    return null;
+  }
 }
 
 /** The page's address will change with the rooms; what it names relatively must not. */

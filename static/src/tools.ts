@@ -137,8 +137,9 @@ export class Tools {
 
   async search(): Promise<void> {
     const { front, tour } = this.#host;
-    const { Search } = await import("./modes/search.ts");
-    const search = new Search(tour, front.language, front.words, {
+    const script = await front.brought(import("./modes/search.ts"));
+    if (!script) return;
+    const search = new script.Search(tour, front.language, front.words, {
       chosen: (room, note) => {
         front.panel.close();
         this.#host.open(room, note);
@@ -154,9 +155,9 @@ export class Tools {
     const { front, stage } = this.#host;
     front.panel.close();
     if (this.#measure) return this.#endMeasure();
-    const { Measure } = await import("./modes/measure.ts");
-    if (this.#measure) return;
-    this.#measure = new Measure(front.words, () => this.#endMeasure());
+    const script = await front.brought(import("./modes/measure.ts"));
+    if (!script || this.#measure) return;
+    this.#measure = new script.Measure(front.words, () => this.#endMeasure());
     stage.scene.add(this.#measure.group);
     front.overlay.append(this.#measure.element);
     front.canvas.focus({ preventScroll: true });
@@ -184,8 +185,9 @@ export class Tools {
       this.#uncut();
       return front.openTools();
     }
-    const { Section } = await import("./modes/section.ts");
-    const section = new Section(rooms.room, front.words, () => stage.draw());
+    const script = await front.brought(import("./modes/section.ts"));
+    if (!script) return;
+    const section = new script.Section(rooms.room, front.words, () => stage.draw());
     stage.renderer.clippingPlanes = [section.plane];
     this.#isCut = true;
     front.panel.open(front.words.section, section.element);
@@ -225,8 +227,9 @@ export class Tools {
     const { front } = this.#host;
     const address = this.#host.address();
     if (address === null) return;
-    const { shareSheet } = await import("./modes/share.ts");
-    front.panel.open(front.words.share, shareSheet(front.title, address, front.words));
+    const script = await front.brought(import("./modes/share.ts"));
+    if (!script) return;
+    front.panel.open(front.words.share, script.shareSheet(front.title, address, front.words));
   }
 
   async #takeAlong(): Promise<void> {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -97,6 +98,41 @@ def test_a_room_that_does_not_come_stays_told_whatever_else_is(visit: Visit) -> 
     notice.get_by_role("button", name="Fermer").click()
     assert notice.count() == 0
     here.forgive("stairs", "ERR_FAILED", "Failed to", "CONTEXT_LOST", "Context Lost")
+
+
+def test_a_script_that_does_not_come_is_told(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce", locale="en")
+    scripts = re.compile(r"/viewer/(search|overview|measure)-")
+    here.page.route(scripts, lambda route: route.abort())
+    here.open("rooms/chamber1/index.html", levels="root")
+    missing = here.page.locator(".notice:not([hidden])", has_text="part of this page")
+    search = here.page.get_by_role("button", name="Search")
+    orbit = here.page.get_by_role("button", name="Orbit")
+    for choose in (search.click, orbit.click, lambda: here.use("Measure")):
+        choose()
+        missing.get_by_role("button", name="Close").click()
+        assert missing.count() == 0
+    search.click()
+    here.page.unroute(scripts)
+    with here.page.expect_navigation():
+        missing.get_by_role("button", name="Load anew").click()
+    here.wait("window.tourgen?.ready")
+    search.click()
+    here.panel.get_by_role("searchbox").wait_for()
+    here.forgive("ERR_FAILED", "dynamically imported")
+
+
+def test_a_visit_whose_script_does_not_come_is_the_plain_page(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce", locale="en")
+    here.page.route("**/viewer/visit-*.js", lambda route: route.abort())
+    here.page.goto(f"{here.origin}/rooms/chamber1/index.html")
+    here.page.locator(".notice.grave", has_text="The tour could not be loaded").wait_for()
+    assert here.page.locator("main.plain").is_visible()
+    here.page.unroute("**/viewer/visit-*.js")
+    with here.page.expect_navigation():
+        here.page.get_by_role("button", name="Try again").click()
+    here.wait("window.tourgen?.ready")
+    here.forgive("ERR_FAILED")
 
 
 def test_without_webgl_the_page_tells_all(visit: Visit) -> None:

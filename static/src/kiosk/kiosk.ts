@@ -230,18 +230,19 @@ export class Kiosk {
 
   async #askPin(): Promise<void> {
     const { pin } = this.#settings;
-    const { pinPad } = await import("./service.ts");
-    if (!pin) return;
+    const script = await this.#front.brought(import("./service.ts"));
+    if (!script || !pin) return;
     if (this.#state !== "visit") this.#begin(this.#front.language);
     const { panel, words } = this.#front;
-    panel.open(words.service, pinPad(pin, words, () => void this.#openService()));
+    panel.open(words.service, script.pinPad(pin, words, () => void this.#openService()));
   }
 
   async #openService(): Promise<void> {
-    const { serviceSheet } = await import("./service.ts");
+    const script = await this.#front.brought(import("./service.ts"));
+    if (!script) return;
     const { panel, words, language } = this.#front;
     const watch = this.#watch;
-    const content = serviceSheet({
+    const content = script.serviceSheet({
       tour: this.#tour,
       visits: this.#visits,
       faults: this.#faults,

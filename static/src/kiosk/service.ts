@@ -93,7 +93,7 @@ export function serviceSheet(host: ServiceHost): Node[] {
   const kept = async (): Promise<void> => {
     told.textContent = await host.keep(visits.csv);
   };
-  const acts = [act(words.serviceExport, () => void kept()), act(words.serviceRestart, host.restart)];
+  const acts = [act(words.serviceExport, () => void kept()), act(words.reload, host.restart)];
   if (host.end) acts.push(act(words.serviceEnd, host.end));
   return [
     list,

@@ -147,6 +147,19 @@ export class Frontend {
     this.#told.textContent = this.#words.entered.replace("{}", this.text(this.#room.title));
   }
 
+  /** What a script brings; null where it does not come, which is told. */
+  async brought<T>(script: Promise<T>): Promise<T | null> {
+    try {
+      return await script;
+    } catch (error) {
+      reportError(error); // a kiosk keeps it
+      const reload = { label: "reload", act: () => location.reload() } as const;
+      const close = { label: "close", act: () => undefined } as const;
+      this.notice.tell({ says: "pageMissing", ways: [reload, close] });
+      return null;
+    }
+  }
+
   /** Marks the way one sees. */
   mark(way: Way): void {
     this.#dock.mark(way);

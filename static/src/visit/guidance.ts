@@ -44,10 +44,10 @@ export class Guidance {
     if (this.#guide) return this.#guide.toggle();
     const { front, rooms, stage, tour, walking, ways } = this.#host;
     const isWanted = ways.ask();
-    const { Guide } = await import("../modes/guide.ts");
-    if (!isWanted()) return;
+    const script = await front.brought(import("../modes/guide.ts"));
+    if (!script || !isWanted()) return;
     if (ways.way !== "walk") ways.leave();
-    this.#guide = new Guide(
+    this.#guide = new script.Guide(
       {
         attracts,
         stops: tour.stops,

@@ -34,12 +34,12 @@ export class Immersion {
   async begin(): Promise<void> {
     const { front, rooms, stage, walking } = this.#host;
     const { visitor } = walking;
-    const { Immersive } = await import("../modes/immersive.ts");
+    const script = await front.brought(import("../modes/immersive.ts"));
     const { feet } = visitor;
-    if (this.#immersive || !feet) return;
+    if (!script || this.#immersive || !feet) return;
     this.#host.begins();
     try {
-      this.#immersive = await Immersive.begin(
+      this.#immersive = await script.Immersive.begin(
         {
           stage,
           rooms,

@@ -77,9 +77,9 @@ export class Ways {
     if (way === "plan") this.#showPlan();
     else {
       const isWanted = this.ask();
-      const { Overview } = await import("../modes/overview.ts");
-      if (!isWanted()) return;
-      this.#overview = new Overview(
+      const script = await front.brought(import("../modes/overview.ts"));
+      if (!script || !isWanted()) return;
+      this.#overview = new script.Overview(
         {
           tour: this.#host.tour,
           stage,

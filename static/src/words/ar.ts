@@ -21,6 +21,7 @@ export const ARABIC: Words = {
   noView: "لا يوجد هذا المكان في القاعة. أنت الآن عند مدخلها.",
   noPage: "لا توجد هذه الصفحة في الجولة. هذه بدايتها.",
   partMissing: "تعذّر تحميل جزء من هذه القاعة.",
+  pageMissing: "تعذّر تحميل جزء من هذه الصفحة.",
   contextLost: "توقفت رسوميات هذا الجهاز مؤقتًا. ستعود القاعة من تلقاء نفسها.",
   search: "بحث",
   searchHint: "قاعات، قطع، كلمات",
@@ -104,7 +105,7 @@ export const ARABIC: Words = {
   serviceExport: "حفظ الزيارات",
   serviceSaved: "تم الحفظ",
   serviceUnsaved: "لم يُحفظ: ربما امتلأ القرص",
-  serviceRestart: "إعادة التحميل",
+  reload: "إعادة التحميل",
   serviceEnd: "إغلاق الكشك",
   serviceDay: "اليوم",
 };

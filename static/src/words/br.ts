@@ -23,6 +23,7 @@ export const BRETON: Words = {
   noView: "N’eus ket eus al lec’h-se er sal-mañ. Emaoc’h e toull an nor.",
   noPage: "N’eus ket eus ar bajenn-se er weladenn-mañ. Setu an deroù anezhi.",
   partMissing: "N’eus ket bet gallet kargañ ul lodenn eus ar sal-mañ.",
+  pageMissing: "N’eus ket bet gallet kargañ ul lodenn eus ar bajenn-mañ.",
   contextLost: "Paouezet eo skramm an ardivink-mañ da dresañ. Distreiñ a raio ar sal he-unan.",
   search: "Klask",
   searchHint: "Salioù, traoù, gerioù",
@@ -109,7 +110,7 @@ export const BRETON: Words = {
   serviceExport: "Enrollañ ar gweladennoù",
   serviceSaved: "Enrollet",
   serviceUnsaved: "N'eo ket bet enrollet: marteze eo leun ar bladenn",
-  serviceRestart: "Adkargañ",
+  reload: "Adkargañ",
   serviceEnd: "Serriñ ar c’hiosk",
   serviceDay: "Deiz",
 };

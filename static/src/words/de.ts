@@ -24,6 +24,7 @@ export const GERMAN: Words = {
   noView: "Diese Stelle gibt es in diesem Raum nicht. Sie stehen an seinem Eingang.",
   noPage: "Diese Seite gibt es in diesem Rundgang nicht. Dies ist sein Anfang.",
   partMissing: "Ein Teil dieses Raums konnte nicht geladen werden.",
+  pageMissing: "Ein Teil dieser Seite konnte nicht geladen werden.",
   contextLost: "Die Grafik dieses Geräts hat ausgesetzt. Der Raum kommt von selbst zurück.",
   search: "Suche",
   searchHint: "Räume, Objekte, Wörter",
@@ -109,7 +110,7 @@ export const GERMAN: Words = {
   serviceExport: "Besuche speichern",
   serviceSaved: "Gespeichert",
   serviceUnsaved: "Nicht gespeichert: Der Datenträger ist vielleicht voll",
-  serviceRestart: "Neu laden",
+  reload: "Neu laden",
   serviceEnd: "Kiosk schließen",
   serviceDay: "Tag",
 };

@@ -19,6 +19,7 @@ export const ENGLISH = {
   noView: "There is no such place in this room. You stand at its entrance.",
   noPage: "There is no such page in this tour. This is its start.",
   partMissing: "A part of this room could not be loaded.",
+  pageMissing: "A part of this page could not be loaded.",
   contextLost: "The graphics of this device paused. The room comes back by itself.",
   search: "Search",
   searchHint: "Rooms, objects, words",
@@ -102,7 +103,7 @@ export const ENGLISH = {
   serviceExport: "Save the visits",
   serviceSaved: "Saved",
   serviceUnsaved: "Not saved: the disk may be full",
-  serviceRestart: "Load anew",
+  reload: "Load anew",
   serviceEnd: "Close the kiosk",
   serviceDay: "Day",
 };

@@ -24,6 +24,7 @@ export const SPANISH: Words = {
   noView: "Ese lugar no existe en esta sala. Se encuentra en su entrada.",
   noPage: "Esa página no existe en esta visita. Este es su inicio.",
   partMissing: "No se pudo cargar una parte de esta sala.",
+  pageMissing: "No se pudo cargar una parte de esta página.",
   contextLost: "Los gráficos de este dispositivo se han interrumpido. La sala volverá por sí sola.",
   search: "Buscar",
   searchHint: "Salas, objetos, palabras",
@@ -108,7 +109,7 @@ export const SPANISH: Words = {
   serviceExport: "Guardar las visitas",
   serviceSaved: "Guardado",
   serviceUnsaved: "No se ha guardado: puede que el disco esté lleno",
-  serviceRestart: "Volver a cargar",
+  reload: "Volver a cargar",
   serviceEnd: "Cerrar el quiosco",
   serviceDay: "Día",
 };

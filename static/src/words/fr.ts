@@ -22,6 +22,7 @@ export const FRENCH: Words = {
   noView: "Cet endroit n’existe pas dans la salle. Vous êtes à son entrée.",
   noPage: "Cette page n’existe pas dans la visite. En voici le début.",
   partMissing: "Une partie de cette salle n’a pas pu être chargée.",
+  pageMissing: "Une partie de cette page n’a pas pu être chargée.",
   contextLost: "L’affichage de cet appareil s’est interrompu. La salle revient d’elle-même.",
   search: "Rechercher",
   searchHint: "Salles, objets, mots",
@@ -105,7 +106,7 @@ export const FRENCH: Words = {
   serviceExport: "Enregistrer les visites",
   serviceSaved: "Enregistré",
   serviceUnsaved: "Non enregistré : le disque est peut-être plein",
-  serviceRestart: "Recharger",
+  reload: "Recharger",
   serviceEnd: "Fermer la borne",
   serviceDay: "Jour",
 };

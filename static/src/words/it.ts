@@ -24,6 +24,7 @@ export const ITALIAN: Words = {
   noView: "Questo punto non esiste nella sala. Vi trovate al suo ingresso.",
   noPage: "Questa pagina non esiste nella visita. Questo è l’inizio.",
   partMissing: "Non è stato possibile caricare una parte di questa sala.",
+  pageMissing: "Non è stato possibile caricare una parte di questa pagina.",
   contextLost: "La grafica di questo dispositivo si è interrotta. La sala torna da sola.",
   search: "Cerca",
   searchHint: "Sale, oggetti, parole",
@@ -109,7 +110,7 @@ export const ITALIAN: Words = {
   serviceExport: "Salva le visite",
   serviceSaved: "Salvato",
   serviceUnsaved: "Non salvato: il disco potrebbe essere pieno",
-  serviceRestart: "Ricarica",
+  reload: "Ricarica",
   serviceEnd: "Chiudi la postazione",
   serviceDay: "Giorno",
 };

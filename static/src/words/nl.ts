@@ -22,6 +22,7 @@ export const DUTCH: Words = {
   noView: "Deze plek bestaat niet in deze ruimte. U staat bij de ingang.",
   noPage: "Deze pagina bestaat niet in deze rondgang. Dit is het begin.",
   partMissing: "Een deel van deze ruimte kon niet worden geladen.",
+  pageMissing: "Een deel van deze pagina kon niet worden geladen.",
   contextLost: "De beeldweergave van dit apparaat haperde. De ruimte komt vanzelf terug.",
   search: "Zoeken",
   searchHint: "Ruimtes, voorwerpen, woorden",
@@ -107,7 +108,7 @@ export const DUTCH: Words = {
   serviceExport: "Bezoeken opslaan",
   serviceSaved: "Opgeslagen",
   serviceUnsaved: "Niet opgeslagen: de schijf is misschien vol",
-  serviceRestart: "Opnieuw laden",
+  reload: "Opnieuw laden",
   serviceEnd: "Kiosk sluiten",
   serviceDay: "Dag",
 };

@@ -22,6 +22,7 @@ export const PORTUGUESE: Words = {
   noView: "Esse lugar não existe nesta sala. Encontra-se à entrada.",
   noPage: "Essa página não existe nesta visita. Este é o início.",
   partMissing: "Não foi possível carregar uma parte desta sala.",
+  pageMissing: "Não foi possível carregar uma parte desta página.",
   contextLost: "Os gráficos deste dispositivo foram interrompidos. A sala volta por si.",
   search: "Procurar",
   searchHint: "Salas, objetos, palavras",
@@ -106,7 +107,7 @@ export const PORTUGUESE: Words = {
   serviceExport: "Guardar as visitas",
   serviceSaved: "Guardado",
   serviceUnsaved: "Não guardado: o disco pode estar cheio",
-  serviceRestart: "Recarregar",
+  reload: "Recarregar",
   serviceEnd: "Fechar o quiosque",
   serviceDay: "Dia",
 };
