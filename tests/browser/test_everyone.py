@@ -122,6 +122,44 @@ def test_text_at_twice_its_size_still_fits(visit: Visit) -> None:
     assert outside == []
 
 
+def test_the_guided_tour_by_keyboard(visit: Visit) -> None:
+    here = visit(size=SIZES["desktop"], reduced_motion="reduce")
+    here.open("rooms/chamber1/index.html", levels="root")
+    keyboard = here.page.keyboard
+
+    def has_focus(selector: str) -> bool:
+        return bool(here.page.evaluate(f"document.activeElement.matches({selector!r})"))
+
+    here.page.locator(".guide-start").focus()
+    keyboard.press("Enter")
+    here.wait("document.activeElement.matches('.guide .play')")
+    bar = "parseFloat(document.querySelector('.guide-bar').style.transform.slice(7))"
+    here.wait(f"{bar} > 0.05")
+    here.page.evaluate(
+        "window.told = 0; new MutationObserver(() => (window.told += 1)).observe("
+        "document.querySelector('.guide-caption'), { childList: true, characterData: true })"
+    )
+    keyboard.press("Enter")
+    here.page.get_by_role("button", name="Play").wait_for()
+    assert here.page.evaluate(bar) > 0.05, "as long as one has stayed"
+    keyboard.press("Enter")
+    keyboard.press("Enter")
+    assert here.page.evaluate("window.told") == 0, "nothing is read out again"
+
+    here.page.locator(".guide-caption").focus()
+    here.settle()
+    before = [*here.position, *here.look]
+    for key in ("ArrowDown", "PageDown", "ArrowLeft"):
+        keyboard.press(key)
+        here.page.wait_for_timeout(300)
+    here.settle()
+    assert [*here.position, *here.look] == before, "arrows scroll what is read"
+
+    here.page.locator(".guide-controls .round:last-child").focus()
+    keyboard.press("Enter")
+    assert has_focus(".guide-start")
+
+
 def test_the_whole_tour_by_keyboard_alone(visit: Visit) -> None:
     here = visit(size=SIZES["desktop"])
     here.open("rooms/chamber1/index.html", levels="root")

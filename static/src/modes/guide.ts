@@ -70,6 +70,7 @@ export class Guide {
     this.#previous.setAttribute("aria-label", words.previousStop);
     this.#next.setAttribute("aria-label", words.nextStop);
     this.#close.setAttribute("aria-label", words.endGuide);
+    this.#tell();
     this.#show();
   }
 
@@ -81,6 +82,7 @@ export class Guide {
     if (!stop) return;
     this.#at = at;
     this.#stayed = 0;
+    this.#tell();
     this.#show();
     this.#host.leadTo(stop);
   }
@@ -105,6 +107,14 @@ export class Guide {
     this.#show();
   }
 
+  get hasFocus(): boolean {
+    return this.element.contains(document.activeElement);
+  }
+
+  focus(): void {
+    this.#play.focus({ preventScroll: true });
+  }
+
   get attracts(): boolean {
     return this.#host.attracts;
   }
@@ -118,7 +128,7 @@ export class Guide {
     if (!this.#playing) return false;
     if (!this.#host.hasArrived()) return true;
     this.#stayed += dt;
-    this.#bar.style.transform = `scaleX(${Math.min(1, this.#stayed / this.#stay).toFixed(3)})`;
+    this.#fill();
     if (this.#stayed < this.#stay) return true;
     const { stops, attracts } = this.#host;
     if (this.#at < stops.length - 1) this.go(this.#at + 1);
@@ -133,15 +143,23 @@ export class Guide {
     return stop ? stayS(stop, this.#textOf(stop)) : 0;
   }
 
-  #show(): void {
+  /** What is written, even the same, is read out again. */
+  #tell(): void {
     const { stops } = this.#host;
     const stop = stops[this.#at];
     this.#caption.textContent = stop ? this.#textOf(stop) : "";
     this.#count.textContent = `${this.#at + 1} / ${stops.length}`;
+    this.#fill();
+  }
+
+  #fill(): void {
+    this.#bar.style.transform = `scaleX(${Math.min(1, this.#stayed / this.#stay).toFixed(3)})`;
+  }
+
+  #show(): void {
     this.#previous.disabled = this.#at === 0;
-    this.#next.disabled = this.#at >= stops.length - 1;
+    this.#next.disabled = this.#at >= this.#host.stops.length - 1;
     this.#play.replaceChildren(icon(this.#playing ? ICONS.pause : ICONS.play));
     this.#play.setAttribute("aria-label", this.#playing ? this.#words.pause : this.#words.play);
-    this.#bar.style.transform = "scaleX(0)";
   }
 }

@@ -28,6 +28,15 @@ export class Dock {
     this.element = element("section", { class: "dock" }, this.#hint, this.#guide, this.#group);
   }
 
+  get hasFocus(): boolean {
+    return this.element.contains(document.activeElement);
+  }
+
+  /** Hands the focus to where the guided tour begins. */
+  focus(): void {
+    this.#guide.focus({ preventScroll: true });
+  }
+
   say(words: Words): void {
     this.element.setAttribute("aria-label", words.see);
     this.#group.setAttribute("aria-label", words.see);

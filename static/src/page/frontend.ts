@@ -40,10 +40,10 @@ export class Frontend {
   readonly cover: Cover;
   readonly map: MiniMap;
   readonly panel: Panel;
+  readonly dock: Dock;
   /** Where modes put what they show over the picture. */
   readonly overlay = element("div", { class: "overlay" });
   readonly #header: Header;
-  readonly #dock: Dock;
   readonly #told = element("p", { class: "unseen", role: "status" });
   readonly #host: HTMLElement;
   readonly #files: Files;
@@ -91,14 +91,14 @@ export class Frontend {
       language: (tag) => void this.#choose(tag),
       home: () => events.home(),
     });
-    this.#dock = new Dock({ guide: () => events.guide(), see: (way) => events.see(way) });
+    this.dock = new Dock({ guide: () => events.guide(), see: (way) => events.see(way) });
     host.replaceChildren(
       this.canvas,
       this.spots.element,
       this.cover.element,
       this.overlay,
       this.#header.element,
-      this.#dock.element,
+      this.dock.element,
       this.map.element,
       this.panel.element,
       this.notice.element,
@@ -162,13 +162,13 @@ export class Frontend {
 
   /** Marks the way one sees. */
   mark(way: Way): void {
-    this.#dock.mark(way);
+    this.dock.mark(way);
     this.#host.dataset["see"] = way;
     this.#sayHint();
   }
 
   hideHint(): void {
-    this.#dock.hideHint();
+    this.dock.hideHint();
   }
 
   /** @param signs Those of the room, if left out. */
@@ -259,7 +259,7 @@ export class Frontend {
     const tour = this.text(this.#tour.title);
     this.#host.setAttribute("aria-label", tour);
     this.#header.say(words, this.#language, tour, this.text(this.#room.title));
-    this.#dock.say(words);
+    this.dock.say(words);
     this.map.say(words);
     this.panel.setWords(words.close);
     this.notice.say(words);
@@ -272,6 +272,6 @@ export class Frontend {
     const { words } = this;
     const outside = this.#host.dataset["see"] === "orbit" || this.#host.dataset["see"] === "dollhouse";
     const onFoot = isTouch() ? words.hintTouch : words.hintMouse;
-    this.#dock.hint(outside ? words.hintOutside : onFoot);
+    this.dock.hint(outside ? words.hintOutside : onFoot);
   }
 }

@@ -59,7 +59,7 @@ export class Guidance {
       front.words,
       (stop) => front.text(stop.text),
     );
-    if (!attracts) front.overlay.append(this.#guide.element);
+    if (!attracts) this.#seat(this.#guide);
     front.panel.close();
     front.hideHint();
     const here = tour.stops.findIndex(({ room }) => room === rooms.room.id);
@@ -67,14 +67,25 @@ export class Guidance {
   }
 
   end(): void {
-    this.#guide?.element.remove();
+    const guide = this.#guide;
     this.#guide = null;
+    const hadFocus = guide?.hasFocus ?? false;
+    guide?.element.remove();
+    if (hadFocus) this.#host.front.dock.focus();
   }
 
   /** Speaks the language of the page. */
   say(): void {
     const { front } = this.#host;
     this.#guide?.say(front.words, (stop) => front.text(stop.text));
+  }
+
+  /** In the place of the dock, with the focus that it had. */
+  #seat(guide: Guide): void {
+    const { dock, overlay } = this.#host.front;
+    const { hasFocus } = dock;
+    overlay.append(guide.element);
+    if (hasFocus) guide.focus();
   }
 
   #leadTo(stop: Stop): void {

@@ -65,11 +65,11 @@ export class Keyboard {
 }
 
 /**
- * Whether the element uses such keys itself: a choice of languages, a panel that scrolls. Letters
+ * Whether the element uses such keys itself: a choice of languages, a text that scrolls. Letters
  * walk only where nothing that could be meant by them has the focus.
  */
 function keepsKeys(target: EventTarget | null, code: string): boolean {
   if (!(target instanceof Element)) return false;
-  if (target.closest("select, input, textarea, audio, .panel, .plan-sheet")) return true;
+  if (target.closest("select, input, textarea, audio, .panel, .plan-sheet, .guide-caption")) return true;
   return code.startsWith("Key") && target !== document.body && !(target instanceof HTMLCanvasElement);
 }
