@@ -42,10 +42,10 @@ export function lock(page: Window, leave: (address: string) => void): void {
     page.addEventListener(
       kind,
       (event) => {
-        if (isRefused(event)) {
-          event.preventDefault();
-          event.stopPropagation();
-        }
+        if (!isRefused(event)) return;
+        event.preventDefault();
+        // That a key was let go is always heard, or its walk would have no end.
+        if (kind !== "keyup") event.stopPropagation();
       },
       { capture: true },
     );
