@@ -277,6 +277,23 @@ def test_keys_gestures_and_drops_that_leave_the_page_are_refused(kiosk: Kiosk) -
     assert "keydown ArrowLeft" in page.evaluate("window.passed")
 
 
+def test_a_key_let_go_beside_another_is_let_go(kiosk: Kiosk) -> None:
+    here = kiosk()
+    begin(here)
+    before = here.look
+    keyboard = here.page.keyboard
+    keyboard.down("ArrowLeft")
+    leave_alone(here, 1)
+    keyboard.down("Control")
+    keyboard.up("ArrowLeft")
+    keyboard.up("Control")
+    leave_alone(here, 1)
+    look = here.look
+    assert look.tolist() != before.tolist()
+    leave_alone(here, 1)
+    assert here.look.tolist() == look.tolist()
+
+
 # ---- the service corner
 
 
@@ -340,6 +357,46 @@ def test_who_guesses_the_pin_waits(kiosk: Kiosk) -> None:
     leave_alone(here, 2)
     enter(here, PIN)
     here.page.get_by_role("button", name="Save the visits").wait_for()
+
+
+def test_a_pad_opened_anew_knows_of_the_guesses_before(kiosk: Kiosk) -> None:
+    here = kiosk()
+    begin(here)
+    for guesses in (("0000", "1111", "2222"), ("3333", "4444")):
+        open_corner(here)
+        for guess in guesses:
+            enter(here, guess)
+            here.page.get_by_text("Not these").wait_for()
+        here.panel.get_by_role("button", name="Close").click()
+    open_corner(here)
+    enter(here, PIN)
+    here.page.wait_for_timeout(500)
+    assert here.page.locator(".pin-pad").is_visible()
+    leave_alone(here, 50)
+    here.page.mouse.move(300, 300)
+    leave_alone(here, 11)
+    enter(here, PIN)
+    here.page.get_by_role("button", name="Save the visits").wait_for()
+    open_corner(here)
+    enter(here, "0000")
+    here.page.get_by_text("Not these").wait_for()
+    enter(here, PIN)
+    here.page.get_by_role("button", name="Save the visits").wait_for()
+
+
+def test_where_no_browser_checks_a_pin_that_is_told(visit: Visit) -> None:
+    """Over plain http from another machine."""
+    here = visit(size=SIZE, reduced_motion="reduce")
+    here.page.add_init_script(
+        "Object.defineProperty(window, 'isSecureContext', { get: () => false });"
+        "Object.defineProperty(Crypto.prototype, 'subtle', { get: () => undefined });"
+    )
+    here.page.goto(f"{here.origin}/kiosk.html?levels=root")
+    here.wait("window.tourgen?.ready")
+    begin(here)
+    for _ in range(5):
+        here.page.mouse.click(30, 30)
+    here.panel.get_by_text("over https").wait_for()
 
 
 # ---- lasting

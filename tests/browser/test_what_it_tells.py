@@ -174,6 +174,18 @@ def test_a_picture_is_saved(visit: Visit) -> None:
     assert picture.std() > 20, "not blank"
 
 
+def test_where_no_browser_copies_what_is_to_be_copied_is_selected(visit: Visit) -> None:
+    """Over plain http from another machine."""
+    here = visit(size=ROOMY, reduced_motion="reduce", locale="en")
+    here.page.add_init_script("delete Navigator.prototype.clipboard;")
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.use("Share this view")
+    here.panel.get_by_role("button", name="Copy").first.click()
+    field = "document.activeElement"
+    here.wait(f"{field}.matches('textarea') && {field}.selectionEnd === {field}.value.length")
+    assert here.page.evaluate("String(getSelection())").startswith(here.origin)
+
+
 def test_how_the_tour_was_made_can_be_cited(site: Path, visit: Visit) -> None:
     here = visit(size=ROOMY, reduced_motion="reduce", locale="en-GB")
     here.open("rooms/chamber1/index.html", levels="root")

@@ -12,13 +12,15 @@ const BARRED_MS = 60_000;
 const MB = 2 ** 20;
 const SHOWN = 30;
 
+/** Since the PIN was given last, by whatever pad. */
+let tries = 0;
 let barredUntil = 0;
 
 /** Asks for the PIN; calls `opened` when it was given. */
 export function pinPad(lock: Lock, words: Words, opened: () => void): HTMLElement {
+  if (!window.isSecureContext) return element("p", {}, words.servicePlain); // no digests are made there
   const dots = element("p", { class: "pin-dots", "aria-live": "polite" });
   let given = "";
-  let tries = 0;
   const show = (): void => {
     dots.textContent = "●".repeat(given.length) + "○".repeat(lock.length - given.length);
   };
@@ -29,7 +31,10 @@ export function pinPad(lock: Lock, words: Words, opened: () => void): HTMLElemen
     if (given.length < lock.length) return;
     const right = (await digestOf(given, lock)) === lock.digest;
     given = "";
-    if (right) return opened();
+    if (right) {
+      tries = 0;
+      return opened();
+    }
     tries += 1;
     if (tries >= TRIES) barredUntil = performance.now() + BARRED_MS;
     dots.textContent = words.serviceWrong;

@@ -37,20 +37,28 @@ export function frameOf(title: string, address: string): string {
   return frame.outerHTML;
 }
 
+/** Copies a text. Returns whether that is allowed here: over plain http there is no clipboard. */
+async function copy(text: string): Promise<boolean> {
+  try {
+    await navigator.clipboard.writeText(text);
+    return true;
+  } catch {
+    return false;
+  }
+}
+
 /** A text that one click copies. */
 function copied(label: string, text: string, words: Words): HTMLElement {
   const field = element("textarea", { readonly: true, rows: "3", spellcheck: "false" }, text);
   field.addEventListener("focus", () => field.select());
   const told = element("span", { role: "status" });
-  const copy = button("plain-button", () => {
-    void navigator.clipboard.writeText(text).then(
-      () => {
-        told.textContent = words.copied;
-        setTimeout(() => (told.textContent = ""), TOLD_MS);
-      },
-      () => field.focus(), // not allowed here: selected, to be copied by hand
-    );
+  const act = button("plain-button", () => {
+    void copy(text).then((done) => {
+      if (!done) return field.focus(); // selected, to be copied by hand
+      told.textContent = words.copied;
+      setTimeout(() => (told.textContent = ""), TOLD_MS);
+    });
   });
-  copy.append(icon(ICONS.copy), words.copy);
-  return element("div", {}, element("label", {}, element("span", {}, label), field), copy, told);
+  act.append(icon(ICONS.copy), words.copy);
+  return element("div", {}, element("label", {}, element("span", {}, label), field), act, told);
 }

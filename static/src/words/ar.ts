@@ -97,6 +97,7 @@ export const ARABIC: Words = {
   kioskCodeHint: "وجّه كاميرا هاتف نحوه.",
   service: "الصيانة",
   serviceWrong: "أرقام غير صحيحة",
+  servicePlain: "لا يمكن التحقق من رقم PIN إلا عبر https أو على localhost.",
   serviceUptime: "مدة التشغيل",
   serviceMemory: "ذاكرة البرنامج",
   serviceUnknown: "لا يفصح عنها هذا المتصفح",

@@ -102,6 +102,7 @@ export const BRETON: Words = {
   kioskCodeHint: "Poentit kamera ur pellgomzer warnañ.",
   service: "Trezalc’h",
   serviceWrong: "Sifroù fall",
+  servicePlain: "Ne c’haller gwiriañ ar c’hod PIN nemet dre https pe war localhost.",
   serviceUptime: "O vont en-dro abaoe",
   serviceMemory: "Memor ar skript",
   serviceUnknown: "n’eo ket lavaret gant ar merdeer-mañ",

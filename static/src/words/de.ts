@@ -102,6 +102,7 @@ export const GERMAN: Words = {
   kioskCodeHint: "Richten Sie die Kamera eines Telefons darauf.",
   service: "Wartung",
   serviceWrong: "Falsche Ziffern",
+  servicePlain: "Die PIN lässt sich nur über https oder auf localhost prüfen.",
   serviceUptime: "In Betrieb seit",
   serviceMemory: "Speicher des Skripts",
   serviceUnknown: "von diesem Browser nicht angegeben",

@@ -95,6 +95,7 @@ export const ENGLISH = {
   kioskCodeHint: "Point a telephone’s camera at it.",
   service: "Service",
   serviceWrong: "Not these",
+  servicePlain: "The PIN can be checked over https or on localhost only.",
   serviceUptime: "Running for",
   serviceMemory: "Memory of the script",
   serviceUnknown: "not told by this browser",

@@ -101,6 +101,7 @@ export const SPANISH: Words = {
   kioskCodeHint: "Apunte con la cámara de un teléfono.",
   service: "Mantenimiento",
   serviceWrong: "Cifras incorrectas",
+  servicePlain: "El PIN solo puede comprobarse por https o en localhost.",
   serviceUptime: "En marcha desde hace",
   serviceMemory: "Memoria del programa",
   serviceUnknown: "este navegador no lo indica",

@@ -98,6 +98,7 @@ export const FRENCH: Words = {
   kioskCodeHint: "Visez-le avec l’appareil photo d’un téléphone.",
   service: "Entretien",
   serviceWrong: "Pas ceux-là",
+  servicePlain: "Le code PIN ne peut être vérifié qu’en https ou sur localhost.",
   serviceUptime: "En marche depuis",
   serviceMemory: "Mémoire du script",
   serviceUnknown: "ce navigateur ne le dit pas",

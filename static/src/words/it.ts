@@ -102,6 +102,7 @@ export const ITALIAN: Words = {
   kioskCodeHint: "Inquadrare con la fotocamera di un telefono.",
   service: "Manutenzione",
   serviceWrong: "Cifre errate",
+  servicePlain: "Il PIN si può verificare solo via https o su localhost.",
   serviceUptime: "In funzione da",
   serviceMemory: "Memoria dello script",
   serviceUnknown: "non indicata da questo browser",

@@ -100,6 +100,7 @@ export const DUTCH: Words = {
   kioskCodeHint: "Richt de camera van een telefoon erop.",
   service: "Onderhoud",
   serviceWrong: "Onjuiste cijfers",
+  servicePlain: "De pincode kan alleen via https of op localhost worden gecontroleerd.",
   serviceUptime: "Actief sinds",
   serviceMemory: "Geheugen van het script",
   serviceUnknown: "niet vermeld door deze browser",

@@ -99,6 +99,7 @@ export const PORTUGUESE: Words = {
   kioskCodeHint: "Aponte a câmara de um telefone.",
   service: "Manutenção",
   serviceWrong: "Algarismos errados",
+  servicePlain: "O PIN só pode ser verificado por https ou em localhost.",
   serviceUptime: "Em funcionamento há",
   serviceMemory: "Memória do programa",
   serviceUnknown: "não indicada por este navegador",
