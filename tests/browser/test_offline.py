@@ -150,3 +150,10 @@ def test_who_saves_data_is_asked_first(visit: Visit) -> None:
     offer.click()
     here.page.get_by_text("works without a network").wait_for()
     here.wait(ALONG)
+    here.page.evaluate(
+        "(() => { window.told = [];"
+        "navigator.serviceWorker.onmessage = ({ data }) => told.push(data); })()"
+    )
+    here.page.evaluate("fetch('tour.json').then((answer) => answer.text())")
+    here.page.wait_for_timeout(500)
+    assert here.page.evaluate("window.told") == [], "what is served is not on its way"

@@ -61,7 +61,6 @@ def kiosk_settings(kiosk: Kiosk, told: Json) -> Json:
         "hours": dict(kiosk.hours) if kiosk.hours else None,
         "pin": _lock(kiosk.pin, told) if kiosk.pin else None,
         "codes": codes(told),
-        "home": told["address"],
     }
 
 

@@ -37,8 +37,7 @@ def worker_script(out: Path, code: str) -> str:
     """
     files = [_entry(out, path) for path in sorted(out.rglob("*")) if _is_taken(out, path)]
     size = sum(path.stat().st_size for path in out.rglob("*") if _is_taken(out, path))
-    version = hashlib.sha256(json.dumps(files).encode()).hexdigest()[:16]
-    told = json.dumps({"version": version, "bytes": size, "files": files})
+    told = json.dumps({"bytes": size, "files": files})
     return f"self.tour={told};\n{code}"
 
 

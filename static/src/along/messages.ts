@@ -7,6 +7,5 @@ export interface Asked {
 
 /** From the worker: so much of a version has come, 0 to 1. */
 export interface Told {
-  readonly tour: string;
   readonly taken: number;
 }

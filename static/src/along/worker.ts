@@ -20,17 +20,17 @@ interface File {
 }
 
 declare const self: ServiceWorkerGlobalScope & {
-  readonly tour: { readonly version: string; readonly bytes: number; readonly files: File[] };
+  readonly tour: { readonly bytes: number; readonly files: File[] };
 };
 
 let taken = 0;
 
 addPlugins([
   {
-    handlerDidComplete: async ({ error }) => {
-      if (error) return;
+    handlerDidComplete: async ({ error, event }) => {
+      if (error || event.type !== "install") return; // served, of a version that is here
       taken += 1;
-      await tell({ tour: self.tour.version, taken: taken / self.tour.files.length });
+      await tell({ taken: taken / self.tour.files.length });
     },
   },
   new RangeRequestsPlugin() as WorkboxPlugin, // sounds are asked for by parts

@@ -20,8 +20,6 @@ export interface KioskSettings {
   readonly pin: Lock | null;
   /** Paths of QR codes, by the address that each leads to. */
   readonly codes: Readonly<Record<string, string>>;
-  /** Where the tour is published. */
-  readonly home: string | null;
 }
 
 /** Reads the page's attribute. */
