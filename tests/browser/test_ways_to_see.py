@@ -71,6 +71,21 @@ def test_the_dollhouse_shows_every_room_in_its_place_and_leads_into_it(
     assert here.page.evaluate("window.tourgen.see") == "walk"
 
 
+def test_a_room_out_of_the_picture_is_brought_into_it_by_tab(visit: Visit) -> None:
+    here = visit(size=ROOMY, reduced_motion="reduce")
+    here.open("rooms/chamber1/index.html", levels="root")
+    here.see("Dollhouse")
+    here.settle()
+    here.page.keyboard.down("ArrowUp")
+    away = here.page.locator(".spot.place.away")
+    away.first.wait_for(state="attached")
+    here.page.keyboard.up("ArrowUp")
+    here.settle()
+    away.first.focus()
+    here.wait("!document.activeElement.matches('.away')")
+    assert here.page.evaluate("document.activeElement.matches('.place')")
+
+
 def test_the_plan_shows_where_one_is_and_leads_to_where_one_clicks(visit: Visit) -> None:
     here = visit(size=ROOMY, reduced_motion="reduce")
     here.open("rooms/chamber1/index.html", levels="root")

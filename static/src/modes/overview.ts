@@ -13,13 +13,14 @@ import {
   Vector4,
   type PerspectiveCamera,
 } from "three";
-import { element, prefersStillness } from "../dom.ts";
+import { prefersStillness } from "../dom.ts";
 import type { Spot } from "../page/hotspots.ts";
+import { placeSpot } from "../page/signs.ts";
 import type { Rooms } from "../rooms.ts";
 import { between } from "../scene/place.ts";
 import type { RoomTiles } from "../scene/room-tiles.ts";
 import type { Stage } from "../scene/stage.ts";
-import type { Room, Tour, View } from "../tour.ts";
+import type { Room, Tour, Triple, View } from "../tour.ts";
 import type { Wish } from "../walk/keyboard.ts";
 import { EYE_M } from "../walk/walker.ts";
 
@@ -44,7 +45,6 @@ const LOWEST = 1.5;
 const FLIGHT_S = 0.55;
 const TURN_RAD_S = 1.2;
 const DOLLY_PER_S = 1.1;
-const SIGN_FADE_M: readonly [number, number] = [200, 400];
 
 export interface OverviewHost {
   readonly tour: Tour;
@@ -97,11 +97,11 @@ export class Overview {
   signs(): Spot[] {
     if (this.#others.length === 0) return [];
     return this.#shown.map(({ room, matrix }) => {
-      const name = this.#host.titleOf(room);
-      const button = element("button", { type: "button", class: "spot place" }, name);
-      button.addEventListener("click", () => this.#host.enter(room, room.entry));
-      const at = centreOf(room).applyMatrix4(matrix);
-      return { at: [at.x, at.y, at.z], button, fade: SIGN_FADE_M };
+      const { x, y, z } = centreOf(room).applyMatrix4(matrix);
+      const enter = (): void => this.#host.enter(room, room.entry);
+      return placeSpot(this.#host.titleOf(room), [x, y, z], enter, {
+        reached: (at) => this.#bring(at),
+      });
     });
   }
 
@@ -171,6 +171,15 @@ export class Overview {
       this.#host.stage.scene.remove(tiles.group);
       tiles.dispose();
     }
+  }
+
+  /** Moves until a place is in the picture that is out of it. */
+  #bring(at: Triple): void {
+    const { camera } = this.#host.stage;
+    const { x, y, z } = new Vector3(...at).project(camera);
+    if (z < 1 && Math.max(Math.abs(x), Math.abs(y)) < 1) return;
+    void this.#controls.moveTo(...at, !prefersStillness());
+    this.#host.stage.wake();
   }
 
   #load(room: Room, here: Room): Shown {

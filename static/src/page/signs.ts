@@ -7,6 +7,7 @@ import { isDrag } from "../walk/pointer.ts";
 
 const DOOR_FADE_M = [9, 18] as const;
 const NOTE_FADE_M = [4, 8] as const;
+const PLACE_FADE_M = [200, 400] as const;
 
 export interface SignEvents {
   /** A door was clicked. */
@@ -36,6 +37,18 @@ export function noteSpot(note: Note, title: string, open: () => void, events: Si
   return spot(button, note.at, NOTE_FADE_M, events);
 }
 
+/** A room's name, seen from outside. */
+export function placeSpot(
+  name: string,
+  at: Triple,
+  enter: () => void,
+  events: Pick<SignEvents, "reached">,
+): Spot {
+  const button = element("button", { type: "button", class: "spot place" }, name);
+  button.addEventListener("click", enter);
+  return spot(button, at, PLACE_FADE_M, events);
+}
+
 /**
  * A finger that lifts from a button clicks it: of a tap that follows two fingers Chromium makes no
  * click now and then. One that drags does not: the sign follows it as the view turns, and a touch ends
@@ -60,7 +73,7 @@ function spot(
   button: HTMLButtonElement,
   at: Triple,
   fade: readonly [number, number],
-  events: SignEvents,
+  events: Pick<SignEvents, "reached">,
 ): Spot {
   clickByTouch(button);
   button.addEventListener("focus", () => {
