@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from published import rooms_of, tour_of
 from visitor import ROOMY, Visit, box_of
 
