@@ -194,7 +194,7 @@ export class Kiosk {
       return;
     }
     this.#failedSince ??= now;
-    if (this.#state === "visit" || now - this.#failedSince < PATIENCE_S * 1000) return;
+    if (this.#state !== "attract" || now - this.#failedSince < PATIENCE_S * 1000) return;
     this.#failedSince = now;
     this.#visit.attract();
   }
