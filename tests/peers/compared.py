@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from first_picture import ALIKE_DB, Loading, loaded, sharp_picture
-from hosting import Host, hosted
+from hosting import hosted_apart
 from lossless import leaves_of, lossless_site, write_lossless
 from one_file import PACKERS, packed
 from other_viewers import DONE, VIEWERS, Eye, page_of, staged
@@ -92,9 +92,9 @@ def compared(browser: Browser, tour: Path, room: str, scratch: Path) -> list[Row
     lossless_site(site, room, whole, folder / "lossless")
     near_db = _nearness(browser, site, folder / "lossless", page, eye)
     staged(folder / "pages")
-    with hosted(site, SECURITY_HEADERS) as own, hosted(folder / "pages", {}) as host:
+    with hosted_apart(site, SECURITY_HEADERS) as own, hosted_apart(folder / "pages", {}) as host:
         contestants = [
-            _Contestant(OURS, "tileset", f"{own.origin}/{page}", SETTLED, BARE, near_db),
+            _Contestant(OURS, "tileset", f"{own}/{page}", SETTLED, BARE, near_db),
             *_others(browser, host, whole, eye, near_db),
         ]
         turns = [
@@ -110,14 +110,14 @@ def _nearness(browser: Browser, site: Path, lossless: Path, page: str, eye: Eye)
     there = f"window.tourgen.teleport({list(eye.position)}, {list(eye.look_at)})"
     pictures = []
     for folder in (lossless, site):
-        with hosted(folder, SECURITY_HEADERS) as host:
-            url = f"{host.origin}/{page}"
+        with hosted_apart(folder, SECURITY_HEADERS) as host:
+            url = f"{host}/{page}"
             pictures.append(sharp_picture(browser, url, SETTLED, BARE, there))
     return psnr_db(*pictures)
 
 
 def _others(
-    browser: Browser, host: Host, whole: Path, eye: Eye, asked_db: float
+    browser: Browser, host: str, whole: Path, eye: Eye, asked_db: float
 ) -> Iterator[_Contestant]:
     for viewer in VIEWERS:
         show = _shower(browser, host, viewer, eye)
@@ -139,14 +139,14 @@ def _row(contestant: _Contestant, runs: list[Loading]) -> Row:
     )
 
 
-def _shower(browser: Browser, host: Host, viewer: str, eye: Eye) -> Callable[[Path], Picture]:
+def _shower(browser: Browser, host: str, viewer: str, eye: Eye) -> Callable[[Path], Picture]:
     """What a viewer shows of a file in the end."""
     return lambda file: sharp_picture(browser, _address(host, viewer, file, eye), DONE)
 
 
-def _address(host: Host, viewer: str, file: Path, eye: Eye) -> str:
+def _address(host: str, viewer: str, file: Path, eye: Eye) -> str:
     shutil.copy(file, file.parent / "pages/models")
-    return f"{host.origin}/{page_of(viewer, file.name, eye)}"
+    return f"{host}/{page_of(viewer, file.name, eye)}"
 
 
 def _equal(

@@ -15,6 +15,8 @@ from dataclasses import dataclass, field
 from functools import cache, partial
 from http import HTTPStatus
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -67,6 +69,29 @@ def hosted(folder: Path, headers: Mapping[str, str]) -> Iterator[Host]:
         Thread(target=server.serve_forever, daemon=True).start()
         yield host
         server.shutdown()
+
+
+@contextmanager
+def hosted_apart(folder: Path, headers: Mapping[str, str]) -> Iterator[str]:
+    """The same from a process of its own, as hosts are: the address.
+
+    One in this process waits for whatever drives the browser, the longer the more is asked for.
+    """
+    context = get_context("spawn")
+    here, there = context.Pipe()
+    process = context.Process(target=_host, args=(folder, dict(headers), there), daemon=True)
+    process.start()
+    try:
+        yield str(here.recv())
+    finally:
+        process.terminate()
+        process.join()
+
+
+def _host(folder: Path, headers: Mapping[str, str], told: Connection) -> None:
+    with hosted(folder, headers) as host:
+        told.send(host.origin)
+        told.recv()  # until it is ended
 
 
 class _Handler(SimpleHTTPRequestHandler):
