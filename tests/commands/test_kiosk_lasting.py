@@ -80,7 +80,7 @@ class Lasting:
         site: What it shows.
         files: Of that, each with its digest.
         start: Starts it anew.
-        within_s: How soon it is to be back.
+        is_alone: Whether nothing else runs on the machine.
     """
 
     kiosk: Kiosk
@@ -89,8 +89,13 @@ class Lasting:
     site: Path
     files: list[dict[str, str]]
     start: Callable[[], Kiosk]
+    is_alone: bool
 
-    within_s: float
+    @property
+    def within_s(self) -> float:
+        """How soon it is to be back: ten seconds, beside other work as much longer."""
+        busy = os.getloadavg()[0] / (os.cpu_count() or 1)
+        return BACK_WITHIN_S * (1 if self.is_alone else max(1, busy))
 
     def back(self, condition: str = "true") -> Page:
         """Its page, once the tour attracts and a condition holds; it is whole."""
@@ -150,18 +155,12 @@ def lasting(
             raise
     disk.free()
     own = urlsplit(page.url).port
-    within_s = back_within_s(pytestconfig)
-    lived = Lasting(kiosk, disk, tour, tour / "site", files, partial(start, own), within_s)
+    is_alone = pytestconfig.getoption("--acts") >= SOAK_ACTS
+    lived = Lasting(kiosk, disk, tour, tour / "site", files, partial(start, own), is_alone)
     kill_browser(lived, page)  # one that began on a full disk keeps nothing until it begins anew
     yield lived
     lived.kiosk.close()
     assert lived.kiosk.family() == []
-
-
-def back_within_s(config: pytest.Config) -> float:
-    """Ten seconds, as ``make soak`` asks alone on a machine; beside other work as much longer."""
-    alone = config.getoption("--acts") >= SOAK_ACTS
-    return BACK_WITHIN_S * (1 if alone else max(1, os.getloadavg()[0] / (os.cpu_count() or 1)))
 
 
 def files_of(site: Path) -> list[dict[str, str]]:
